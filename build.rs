@@ -1,0 +1,186 @@
+//! Compiles `glsl/stages/*.comp` to SPIR-V, reflects what each stage binds, and writes the `shaders` module.
+//!
+//! A block's name in GLSL is its buffer's name in [`BufferId`](src/stage.rs): a name without a variant of that enum
+//! fails the compilation of the generated module. Bindings are numbered by the compiler and never written by hand.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+use anyhow::{Context, Result, bail, ensure};
+use spirq::ReflectConfig;
+use spirq::entry_point::EntryPoint;
+use spirq::ty::{AccessType, DescriptorType, StructType, Type};
+use spirq::var::Variable;
+
+fn main() -> Result<()> {
+    println!("cargo:rerun-if-changed=glsl");
+    println!("cargo:rerun-if-changed=build.rs");
+    let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
+    let out = PathBuf::from(env::var("OUT_DIR")?);
+
+    let mut sources: Vec<PathBuf> = fs::read_dir(root.join("glsl/stages"))?
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<std::io::Result<_>>()?;
+    sources.retain(|path| path.extension().is_some_and(|extension| extension == "comp"));
+    sources.sort();
+
+    let compiler = shaderc::Compiler::new().context("shaderc: no compiler")?;
+    let mut module = String::new();
+    let mut names = Vec::new();
+    for source in &sources {
+        let name = source.file_stem().and_then(|stem| stem.to_str()).context("stage's file name")?.to_owned();
+        let named = compile(&compiler, source, &root, shaderc::OptimizationLevel::Zero)?;
+        let optimised = compile(&compiler, source, &root, shaderc::OptimizationLevel::Performance)?;
+        fs::write(out.join(format!("{name}.spv")), optimised.as_binary_u8())?;
+        let entry_point = reflect(named.as_binary()).with_context(|| source.display().to_string())?;
+        describe(&mut module, &name, &entry_point).with_context(|| source.display().to_string())?;
+        names.push(name.to_uppercase());
+    }
+    writeln!(module, "/// Every stage's shader.\npub static ALL: &[&Shader] = &[{}];", {
+        names.iter().map(|name| format!("&{name}")).collect::<Vec<_>>().join(", ")
+    })?;
+    fs::write(out.join("shaders.rs"), module)?;
+    Ok(())
+}
+
+fn compile(
+    compiler: &shaderc::Compiler,
+    source: &Path,
+    root: &Path,
+    level: shaderc::OptimizationLevel,
+) -> Result<shaderc::CompilationArtifact> {
+    let mut options = shaderc::CompileOptions::new().context("shaderc: no options")?;
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
+    options.set_optimization_level(level);
+    options.set_auto_bind_uniforms(true);
+    options.set_warnings_as_errors();
+    options.set_include_callback(|name, _, _, _| {
+        let path = root.join("glsl/shared").join(name);
+        let content = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
+    });
+    let text = fs::read_to_string(source)?;
+    let file = source.strip_prefix(root)?.display().to_string();
+    Ok(compiler.compile_into_spirv(&text, shaderc::ShaderKind::Compute, &file, "main", Some(&options))?)
+}
+
+fn reflect(spirv: &[u32]) -> Result<EntryPoint> {
+    let mut entry_points =
+        ReflectConfig::new().spv(spirv).ref_all_rscs(false).reflect().map_err(|error| anyhow::anyhow!("{error}"))?;
+    ensure!(entry_points.len() == 1, "{} entry points, expected one", entry_points.len());
+    Ok(entry_points.remove(0))
+}
+
+/// Appends the `Shader` constant of the stage `name` to the module.
+fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result<()> {
+    let mut bindings = BTreeMap::new();
+    let mut constants = BTreeMap::new();
+    let mut push_constants = "None".to_owned();
+    for variable in &entry_point.vars {
+        match variable {
+            Variable::Descriptor { desc_bind, desc_ty, ty, .. } => {
+                let Type::Struct(block) = ty else { bail!("a descriptor that is no block") };
+                let buffer = block.name().context("a block without a name")?;
+                let access = match desc_ty {
+                    DescriptorType::StorageBuffer(access) => format!("Access::{}", access_name(*access)),
+                    DescriptorType::UniformBuffer() => "Access::Uniform".to_owned(),
+                    other => bail!("{buffer}: {other:?} isn't a buffer"),
+                };
+                let fields = fields(element(block))?;
+                bindings.insert(
+                    desc_bind.bind(),
+                    format!(
+                        "Binding {{ slot: {}, buffer: BufferId::{buffer}, access: {access}, element: {fields} }}",
+                        desc_bind.bind()
+                    ),
+                );
+            }
+            Variable::PushConstant { ty: Type::Struct(block), .. } => {
+                push_constants = format!("Some({})", fields(block)?);
+            }
+            Variable::SpecConstant { name, spec_id, .. } => {
+                let name = name.as_deref().unwrap_or("").to_owned();
+                constants.insert(*spec_id, name);
+            }
+            other => bail!("unexpected interface: {other:?}"),
+        }
+    }
+    let constants: Vec<String> =
+        constants.iter().map(|(id, name)| format!("SpecConstant {{ id: {id}, name: \"{name}\" }}")).collect();
+    let bindings: Vec<String> = bindings.into_values().collect();
+    writeln!(
+        module,
+        "/// Stage `{name}`.\npub static {}: Shader = Shader {{ name: \"{name}\", \
+         spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")), \
+         workgroup: {}, bindings: &[{}], push_constants: {push_constants}, constants: &[{}] }};",
+        name.to_uppercase(),
+        workgroup_size(entry_point)?,
+        bindings.join(", "),
+        constants.join(", ")
+    )?;
+    Ok(())
+}
+
+/// Invocations of a workgroup, all of them along x.
+fn workgroup_size(entry_point: &EntryPoint) -> Result<u32> {
+    let mode = entry_point
+        .exec_modes
+        .iter()
+        .find(|mode| mode.exec_mode == spirq::spirv::ExecutionMode::LocalSize)
+        .context("no local size")?;
+    let mut sizes = Vec::new();
+    for operand in &mode.operands {
+        let bytes = operand.value.to_typeless().context("a local size that is no literal")?;
+        sizes.push(u32::from_le_bytes(bytes.as_ref().try_into()?));
+    }
+    let [x, 1, 1] = sizes[..] else { bail!("local size {sizes:?}, expected (x, 1, 1)") };
+    Ok(x)
+}
+
+fn access_name(access: AccessType) -> &'static str {
+    match access {
+        AccessType::ReadOnly => "Read",
+        AccessType::WriteOnly => "Write",
+        AccessType::ReadWrite => "ReadWrite",
+    }
+}
+
+/// The struct that a block holds, one or many of, or the block itself.
+fn element(block: &StructType) -> &StructType {
+    match block.members.as_slice() {
+        [member] => match &member.ty {
+            Type::Struct(element) => element,
+            Type::Array(array) => match array.element_ty.as_ref() {
+                Type::Struct(element) => element,
+                _ => block,
+            },
+            _ => block,
+        },
+        _ => block,
+    }
+}
+
+fn size(ty: &Type) -> Result<usize> {
+    Ok(match ty {
+        Type::Array(array) => match (array.nelement, array.stride) {
+            (Some(count), Some(stride)) => count as usize * stride,
+            _ => 0,
+        },
+        other => other.nbyte().or_else(|| other.min_nbyte()).context("a type without a size")?,
+    })
+}
+
+fn fields(layout: &StructType) -> Result<String> {
+    let mut fields = Vec::new();
+    for member in &layout.members {
+        fields.push(format!(
+            "Field {{ name: \"{}\", offset: {}, size: {} }}",
+            member.name.as_deref().unwrap_or(""),
+            member.offset.context("a member without an offset")?,
+            size(&member.ty)?
+        ));
+    }
+    Ok(format!("StructLayout {{ name: \"{}\", fields: &[{}] }}", layout.name().unwrap_or(""), fields.join(", ")))
+}

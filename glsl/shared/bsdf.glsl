@@ -1,0 +1,70 @@
+// Smooth boundaries. Directions: `incoming` flies towards the surface; cosines are positive.
+
+// Unpolarised Fresnel reflectance of a dielectric; eta: index of the incident side over that of the other side.
+float fresnel_dielectric(float cos_i, float eta, out float cos_t) {
+    float sin2_t = eta * eta * max(0.0, 1.0 - cos_i * cos_i);
+    if (sin2_t >= 1.0) {
+        cos_t = 0.0;
+        return 1.0;
+    }
+    cos_t = sqrt(1.0 - sin2_t);
+    float parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    float perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    return 0.5 * (parallel * parallel + perpendicular * perpendicular);
+}
+
+// Schlick's approximation, as glTF 2.0, appendix B, has it for metals.
+vec3 fresnel_schlick(vec3 f0, float cos_i) {
+    float m = clamp(1.0 - cos_i, 0.0, 1.0);
+    float m2 = m * m;
+    return f0 + (1.0 - f0) * (m2 * m2 * m);
+}
+
+// A ray's meeting with a surface, with both normals turned to the side that the ray comes from.
+struct Facing {
+    vec3 geometric_normal;
+    vec3 shading_normal;
+    bool front; // the ray meets the triangle's front
+};
+
+Facing face(Surface surface, vec3 incoming) {
+    Facing facing;
+    facing.front = dot(incoming, surface.geometric_normal) < 0.0;
+    float side = facing.front ? 1.0 : -1.0;
+    facing.geometric_normal = side * surface.geometric_normal;
+    facing.shading_normal = side * surface.shading_normal;
+    // Past the horizon of the shading normal (at silhouettes of tessellated shapes) the geometric one stands in.
+    if (dot(incoming, facing.shading_normal) >= 0.0) {
+        facing.shading_normal = facing.geometric_normal;
+    }
+    return facing;
+}
+
+// What can happen at a dielectric boundary.
+struct Boundary {
+    float reflectance;
+    float eta;       // index of the incident side over that of the other side
+    vec3 reflected;  // directions
+    vec3 refracted;
+};
+
+Boundary meet_boundary(Facing facing, vec3 incoming, float ior) {
+    Boundary boundary;
+    boundary.eta = facing.front ? 1.0 / ior : ior;
+    vec3 n = facing.shading_normal;
+    float cos_i = -dot(incoming, n);
+    float cos_t;
+    boundary.reflectance = fresnel_dielectric(cos_i, boundary.eta, cos_t);
+    boundary.reflected = normalize(incoming + 2.0 * cos_i * n);
+    boundary.refracted = normalize(boundary.eta * incoming + (boundary.eta * cos_i - cos_t) * n);
+    return boundary;
+}
+
+// A ray that leaves the surface starts on the side that it flies to.
+vec3 origin_towards(vec3 position, vec3 geometric_normal, vec3 direction) {
+    return offset_origin(position, dot(direction, geometric_normal) >= 0.0 ? geometric_normal : -geometric_normal);
+}
+
+float largest(vec3 v) {
+    return max(v.x, max(v.y, v.z));
+}

@@ -1,0 +1,28 @@
+// Emissive triangles. Include after scene.glsl.
+struct Light {
+    uint triangle;
+    float cumulative;  // probability of this light and those before it
+    float probability; // in proportion to its flux
+    float area;        // render units²
+};
+
+layout(std430) readonly buffer Lights { Light lights[]; };
+
+// The light at u in [0, 1), by bisection of the cumulative probabilities.
+uint choose_light(float u) {
+    uint low = 0u;
+    uint high = settings.light_count - 1u;
+    while (low < high) {
+        uint middle = (low + high) / 2u;
+        if (u < lights[middle].cumulative) {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    return low;
+}
+
+bool emits(Material material, bool front) {
+    return front || material.double_sided != 0u;
+}

@@ -1,0 +1,46 @@
+const float PI = 3.14159265358979;
+
+// An orthonormal basis around the unit vector n: Duff and others, «Building an Orthonormal Basis, Revisited», 2017.
+mat3 basis(vec3 n) {
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    return mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n);
+}
+
+// A direction around the unit vector n with density cos θ / π (Malley's method).
+vec3 cosine_direction(vec3 n, vec2 u) {
+    float r = sqrt(u.x);
+    float phi = 2.0 * PI * u.y;
+    vec3 local = vec3(r * cos(phi), r * sin(phi), sqrt(max(0.0, 1.0 - u.x)));
+    return normalize(basis(n) * local);
+}
+
+// Barycentric coordinates (u, v) of a point uniform on a triangle.
+vec2 triangle_point(vec2 u) {
+    float s = sqrt(u.x);
+    return vec2(1.0 - s, u.y * s);
+}
+
+vec2 sign_not_zero(vec2 v) {
+    return vec2(v.x >= 0.0 ? 1.0 : -1.0, v.y >= 0.0 ? 1.0 : -1.0);
+}
+
+// Unit vector to two 16-bit numbers by the octahedral map: Cigolle and others, «A Survey of Efficient Representations
+// for Independent Unit Vectors», JCGT 3(2), 2014. The largest error is about 5e-5 rad.
+uint encode_direction(vec3 d) {
+    vec2 p = d.xy / (abs(d.x) + abs(d.y) + abs(d.z));
+    if (d.z < 0.0) {
+        p = (1.0 - abs(p.yx)) * sign_not_zero(p);
+    }
+    return packSnorm2x16(p);
+}
+
+vec3 decode_direction(uint code) {
+    vec2 p = unpackSnorm2x16(code);
+    vec3 d = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    if (d.z < 0.0) {
+        d.xy = (1.0 - abs(d.yx)) * sign_not_zero(d.xy);
+    }
+    return normalize(d);
+}

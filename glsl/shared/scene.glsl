@@ -1,0 +1,106 @@
+// The scene as the rays see it. Include after settings.glsl and sampling.glsl.
+
+const uint MISS = 0xffffffffu;
+
+const uint MATTE = 0u;
+const uint MIRROR = 1u;
+const uint DIELECTRIC = 2u;
+
+struct BvhNode {
+    vec4 left_min;  // w: uint bits, first child's index, or the leaf's first triangle
+    vec4 left_max;  // w: uint bits, the leaf's triangle count; 0 for an inner node
+    vec4 right_min;
+    vec4 right_max;
+};
+
+// Havel and Herout's precomputed triangle.
+struct HavelTriangle {
+    vec4 n0; // xyz: normal, w: its plane's offset
+    vec4 n1;
+    vec4 n2;
+};
+
+// A triangle as shading needs it. In each w: the vertex's shading normal, octahedral.
+struct ShadingTriangle {
+    vec4 p0;
+    vec4 p1;
+    vec4 p2;
+    uint object;
+    uint material;
+    uint smooth_shaded; // 1 where the shading normals differ from the geometric one
+    uint padding;
+};
+
+struct Material {
+    vec3 base_color;
+    uint surface;      // MATTE, MIRROR or DIELECTRIC
+    vec3 emission;     // radiance
+    float ior;
+    uint double_sided; // emits on both sides
+    uint padding0;
+    uint padding1;
+    uint padding2;
+};
+
+layout(std430) readonly buffer Bvh { BvhNode bvh[]; };
+layout(std430) readonly buffer HavelTriangles { HavelTriangle havel_triangles[]; };
+layout(std430) readonly buffer ShadingTriangles { ShadingTriangle shading_triangles[]; };
+layout(std430) readonly buffer Materials { Material materials[]; };
+
+struct Hit {
+    float t;
+    float u;
+    float v;
+    uint triangle; // MISS where nothing was hit
+};
+
+// Where a ray met a surface.
+struct Surface {
+    vec3 position;
+    vec3 geometric_normal; // of the triangle's front
+    vec3 shading_normal;   // on the same side
+    uint triangle;
+    uint object;
+    uint material;
+};
+
+vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_normal) {
+    if (triangle.smooth_shaded == 0u) {
+        return geometric_normal;
+    }
+    vec3 n0 = decode_direction(floatBitsToUint(triangle.p0.w));
+    vec3 n1 = decode_direction(floatBitsToUint(triangle.p1.w));
+    vec3 n2 = decode_direction(floatBitsToUint(triangle.p2.w));
+    vec3 n = (1.0 - uv.x - uv.y) * n0 + uv.x * n1 + uv.y * n2;
+    float length2 = dot(n, n);
+    return length2 > 1e-12 && dot(n, geometric_normal) > 0.0 ? n * inversesqrt(length2) : geometric_normal;
+}
+
+// The point is rebuilt from the barycentric coordinates: unlike origin + t·direction its error doesn't grow with t.
+Surface surface_at(uint index, vec2 uv) {
+    ShadingTriangle triangle = shading_triangles[index];
+    vec3 e1 = triangle.p1.xyz - triangle.p0.xyz;
+    vec3 e2 = triangle.p2.xyz - triangle.p0.xyz;
+    Surface surface;
+    surface.position = triangle.p0.xyz + uv.x * e1 + uv.y * e2;
+    surface.geometric_normal = normalize(cross(e1, e2));
+    surface.shading_normal = interpolated_normal(triangle, uv, surface.geometric_normal);
+    surface.triangle = index;
+    surface.object = triangle.object;
+    surface.material = triangle.material;
+    return surface;
+}
+
+// Moves a ray's origin off its surface by integer steps of the floating-point grid: Wächter and Binder, «A Fast and
+// Robust Method for Avoiding Self-Intersection», Ray Tracing Gems, chapter 6. n points to the ray's side.
+vec3 offset_origin(vec3 p, vec3 n) {
+    const float NEAR_ORIGIN = 1.0 / 32.0;
+    const float FLOAT_STEP = 1.0 / 65536.0;
+    const float INT_STEP = 256.0;
+    ivec3 steps = ivec3(INT_STEP * n);
+    vec3 moved = intBitsToFloat(floatBitsToInt(p) + ivec3(p.x < 0.0 ? -steps.x : steps.x, p.y < 0.0 ? -steps.y : steps.y,
+                                                          p.z < 0.0 ? -steps.z : steps.z));
+    return vec3(abs(p.x) < NEAR_ORIGIN ? p.x + FLOAT_STEP * n.x : moved.x,
+                abs(p.y) < NEAR_ORIGIN ? p.y + FLOAT_STEP * n.y : moved.y,
+                abs(p.z) < NEAR_ORIGIN ? p.z + FLOAT_STEP * n.z : moved.z);
+}

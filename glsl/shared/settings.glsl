@@ -1,0 +1,22 @@
+// What stays the same through a render. Mirrors `layout::Settings`.
+layout(std140) uniform Settings {
+    vec4 camera_position;       // w: unused
+    vec4 camera_right;          // scaled so that ±1 is the picture's edge; w: unused
+    vec4 camera_up;             // likewise
+    vec4 camera_forward;        // unit; w: unused
+    uvec2 resolution;           // pixels
+    uint slots_per_pixel;       // visible points a pixel
+    uint seed;
+    uint light_count;           // emissive triangles
+    float light_flux;           // of all lights together: Σ mean(Le) · π · area · sides, render units
+    uint max_depth;             // bounces of a path at the most
+    uint triangle_count;
+    uint photon_lanes;          // invocations among which an iteration's photon paths are dealt
+    uint lane_capacity;         // photons that an invocation can store
+    uint photon_capacity;       // photons that a batch can store
+    uint cell_bits;             // log2 of the cells of the hashed grid
+    float alpha;                // eq. 2
+    float initial_radius2;      // R² of a visible point before its first photon, render units
+    uint loop_limit;            // iterations that all loops of an invocation may make together
+    uint scan_padding;
+} settings;

@@ -1,0 +1,35 @@
+// The paper's hitpoint: where a camera path met a matte surface. Two kinds of places need it: the stages that find it
+// and the gathers.
+struct VisiblePoint {
+    vec4 position_object; // xyz: render space; w: uint bits, object, NO_OBJECT where the path found no matte surface
+    vec4 weight_normal;   // rgb: path throughput × BRDF (1/sr); w: uint bits, octahedral geometric normal on the
+                          // viewer's side
+    vec4 emitted_normal;  // rgb: radiance that the path saw by itself; w: uint bits, octahedral shading normal, same side
+};
+
+const uint NO_OBJECT = 0xffffffffu;
+
+const uint TILE = 8u;
+
+// Visible points are kept in the order of 8×8 tiles of pixels, each 4×2 of a tile together: neighbours in the picture
+// are neighbours in memory. The picture's edge leaves slots unused.
+uvec2 pixel_of(uint pixel_slot) {
+    uint tiles_across = (settings.resolution.x + TILE - 1u) / TILE;
+    uint tile = pixel_slot / (TILE * TILE);
+    uint inside = pixel_slot % (TILE * TILE);
+    uvec2 local = uvec2((inside & 3u) | ((inside >> 1u) & 4u), ((inside >> 2u) & 1u) | ((inside >> 3u) & 6u));
+    return uvec2(tile % tiles_across, tile / tiles_across) * TILE + local;
+}
+
+uint pixel_slot_of(uvec2 pixel) {
+    uint tiles_across = (settings.resolution.x + TILE - 1u) / TILE;
+    uint tile = (pixel.y / TILE) * tiles_across + pixel.x / TILE;
+    uvec2 local = pixel % TILE;
+    uint inside = (local.x & 3u) | ((local.y & 1u) << 2u) | ((local.x & 4u) << 1u) | ((local.y & 6u) << 3u);
+    return tile * TILE * TILE + inside;
+}
+
+uint pixel_slots() {
+    uvec2 tiles = (settings.resolution + TILE - 1u) / TILE;
+    return tiles.x * tiles.y * TILE * TILE;
+}

@@ -1,0 +1,138 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Camera rays: follows each pixel's path over mirrors and glass to its visible points.
+
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "random.glsl"
+#include "scene.glsl"
+#include "intersect.glsl"
+#include "bsdf.glsl"
+#include "light.glsl"
+#include "visible_point.glsl"
+#include "status.glsl"
+
+layout(local_size_x = 64) in;
+
+// Visible points a pixel: above 1, glass splits the path for as long as a slot is free (the paper's estimator, whose
+// visible points are found once and have to hold both branches).
+layout(constant_id = 1) const uint SLOTS = 1u;
+layout(constant_id = 2) const bool JITTER = true;
+
+layout(push_constant) uniform Push {
+    uint iteration;
+} push;
+
+layout(std430) writeonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+
+struct Branch {
+    vec3 origin;
+    vec3 direction;
+    vec3 throughput;
+    vec3 emitted;
+    uint depth;
+    uint ignored;
+};
+
+void main() {
+    uint pixel_slot = gl_GlobalInvocationID.x;
+    if (pixel_slot >= pixel_slots()) {
+        return;
+    }
+    uvec2 pixel = pixel_of(pixel_slot);
+    bool inside = all(lessThan(pixel, settings.resolution));
+
+    Random random = random_for(CAMERA_PATH, pixel.y * settings.resolution.x + pixel.x, push.iteration, settings.seed);
+    vec4 u = next4(random);
+    vec2 film = (vec2(pixel) + (JITTER ? u.xy : vec2(0.5))) / vec2(settings.resolution) * 2.0 - 1.0;
+
+    Branch pending[SLOTS];
+    uint pending_count = 0u;
+    uint used = 0u;
+    Branch branch;
+    branch.origin = settings.camera_position.xyz;
+    branch.direction = normalize(settings.camera_forward.xyz + film.x * settings.camera_right.xyz -
+                                 film.y * settings.camera_up.xyz);
+    branch.throughput = vec3(1.0);
+    branch.emitted = vec3(0.0);
+    branch.depth = 0u;
+    branch.ignored = MISS;
+
+    bool alive = inside;
+    bool cut = false;
+    VisiblePoint visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
+    while (alive) {
+        loop_count += 1u;
+        bool ended = true;
+        visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
+        Hit hit = trace(branch.origin, branch.direction, 1e30, branch.ignored, false);
+        if (loops_cut) {
+            cut = true;
+        } else if (hit.triangle != MISS) {
+            Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
+            Material material = materials[surface.material];
+            Facing facing = face(surface, branch.direction);
+            if (emits(material, facing.front)) {
+                branch.emitted += branch.throughput * material.emission;
+            }
+            vec3 origin = surface.position;
+            if (material.surface == MATTE) {
+                if (largest(material.base_color) > 0.0) {
+                    visible_point.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
+                    visible_point.weight_normal = vec4(branch.throughput * material.base_color / PI,
+                                                       uintBitsToFloat(encode_direction(facing.geometric_normal)));
+                    visible_point.emitted_normal.w = uintBitsToFloat(encode_direction(facing.shading_normal));
+                }
+            } else if (branch.depth + 1u >= settings.max_depth) {
+                atomicAdd(status.truncated_paths, 1u);
+            } else {
+                ended = false;
+                branch.depth += 1u;
+                branch.ignored = hit.triangle;
+                u = next4(random);
+                if (material.surface == MIRROR) {
+                    float cos_i = -dot(branch.direction, facing.shading_normal);
+                    branch.throughput *= fresnel_schlick(material.base_color, cos_i);
+                    branch.direction = normalize(branch.direction + 2.0 * cos_i * facing.shading_normal);
+                } else {
+                    Boundary boundary = meet_boundary(facing, branch.direction, material.ior);
+                    // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
+                    vec3 transmission = material.base_color * (boundary.eta * boundary.eta);
+                    bool split = used + pending_count + 1u < SLOTS && boundary.reflectance < 1.0;
+                    bool reflect_now = u.x < boundary.reflectance;
+                    if (split) {
+                        Branch other = branch;
+                        other.direction = boundary.reflected;
+                        other.throughput *= boundary.reflectance;
+                        other.emitted = vec3(0.0);
+                        other.origin = origin_towards(origin, facing.geometric_normal, other.direction);
+                        pending[pending_count] = other;
+                        pending_count += 1u;
+                        branch.throughput *= 1.0 - boundary.reflectance;
+                        reflect_now = false;
+                    }
+                    branch.direction = reflect_now ? boundary.reflected : boundary.refracted;
+                    branch.throughput *= reflect_now ? vec3(1.0) : transmission;
+                }
+                branch.origin = origin_towards(origin, facing.geometric_normal, branch.direction);
+            }
+        }
+        if (ended) {
+            visible_point.emitted_normal.rgb = branch.emitted;
+            visible_points[pixel_slot * SLOTS + used] = visible_point;
+            used += 1u;
+            alive = pending_count > 0u && !cut;
+            if (alive) {
+                pending_count -= 1u;
+                branch = pending[pending_count];
+            }
+        }
+    }
+    if (cut) {
+        atomicAdd(status.cut_paths, 1u);
+    }
+    visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
+    for (; used < SLOTS; used++) {
+        visible_points[pixel_slot * SLOTS + used] = visible_point;
+    }
+}

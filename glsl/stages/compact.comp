@@ -1,0 +1,41 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Moves the lanes' photons together, in the order of lanes.
+
+#include "settings.glsl"
+#include "photon.glsl"
+#include "status.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430) readonly buffer LanePhotons { Photon lane_photons[]; };
+layout(std430) readonly buffer LaneCounts { uint lane_counts[]; };
+layout(std430) readonly buffer LaneOffsets { uint lane_offsets[]; };
+layout(std430) readonly buffer ScanTotal { uint scan_total; };
+layout(std430) writeonly buffer PhotonCount { uint photon_count; };
+layout(std430) writeonly buffer Photons { Photon photons[]; };
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i == 0u) {
+        status.photons_in_batch = max(status.photons_in_batch, scan_total);
+        photon_count = min(scan_total, settings.photon_capacity);
+        if (scan_total > settings.photon_capacity) {
+            status.overflow = 1u;
+        }
+        uint before = status.photons_stored_low;
+        status.photons_stored_low = before + scan_total;
+        status.photons_stored_high += before + scan_total < before ? 1u : 0u;
+    }
+    if (i >= settings.photon_lanes * settings.lane_capacity) {
+        return;
+    }
+    uint lane = i % settings.photon_lanes;
+    uint number = i / settings.photon_lanes;
+    if (number < lane_counts[lane]) {
+        uint target = lane_offsets[lane] + number;
+        if (target < settings.photon_capacity) {
+            photons[target] = lane_photons[i];
+        }
+    }
+}

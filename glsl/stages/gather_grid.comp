@@ -1,0 +1,59 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Gathers from the cells of the hashed grid that a visible point's radius reaches.
+
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "photon.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+#include "gather.glsl"
+
+#include "grid.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
+layout(std430) readonly buffer Grid { GridShape grid; };
+layout(std430) readonly buffer SortedPhotons { Photon sorted_photons[]; };
+layout(std430) readonly buffer CellStarts { uint cell_starts[]; };
+layout(std430) readonly buffer CellEnds { uint cell_ends[]; };
+layout(std430) buffer GatheredOf { Gathered gathered[]; };
+
+void main() {
+    uint slot = gl_GlobalInvocationID.x;
+    if (slot >= pixel_slots() * settings.slots_per_pixel) {
+        return;
+    }
+    Receiver receiver = receiver_of(visible_points[slot], statistics[slot].radius2_high);
+    if (receiver.object == NO_OBJECT) {
+        return;
+    }
+    // A little more than R, so that rounding can't leave out the cell of a photon at distance R.
+    float reach = sqrt(receiver.radius2) * 1.000001 + 1e-7;
+    float inverse = grid.inverse_cell_size;
+    ivec3 low = cell_of(receiver.position - reach, inverse);
+    ivec3 high = cell_of(receiver.position + reach, inverse);
+    vec3 flux = vec3(0.0);
+    uint count = 0u;
+    for (int z = low.z; z <= high.z; z++) {
+        for (int y = low.y; y <= high.y; y++) {
+            for (int x = low.x; x <= high.x; x++) {
+                ivec3 cell = ivec3(x, y, z);
+                uint bucket = bucket_of(cell);
+                uint end = cell_ends[bucket];
+                for (uint i = end == 0u ? 0u : cell_starts[bucket]; i < end; i++) {
+                    Photon photon = sorted_photons[i];
+                    // Cells that share a bucket must not be counted twice.
+                    if (accepts(receiver, photon) && cell_of(photon.position_object.xyz, inverse) == cell) {
+                        flux += photon.flux_direction.rgb;
+                        count += 1u;
+                    }
+                }
+            }
+        }
+    }
+    vec4 before = gathered[slot].flux_count;
+    gathered[slot].flux_count = vec4(before.rgb + flux, uintBitsToFloat(floatBitsToUint(before.w) + count));
+}

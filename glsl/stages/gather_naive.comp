@@ -1,0 +1,46 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The paper's naive hitpoint illumination: every visible point against every photon of a range (one dispatch a range,
+// since drivers cut long loops).
+
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "photon.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+#include "gather.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(push_constant) uniform Push {
+    uint first; // photon
+    uint last;
+} push;
+
+layout(std430) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
+layout(std430) readonly buffer Photons { Photon photons[]; };
+layout(std430) readonly buffer PhotonCount { uint photon_count; };
+layout(std430) buffer GatheredOf { Gathered gathered[]; };
+
+void main() {
+    uint slot = gl_GlobalInvocationID.x;
+    if (slot >= pixel_slots() * settings.slots_per_pixel) {
+        return;
+    }
+    Receiver receiver = receiver_of(visible_points[slot], statistics[slot].radius2_high);
+    if (receiver.object == NO_OBJECT) {
+        return;
+    }
+    vec3 flux = vec3(0.0);
+    uint count = 0u;
+    for (uint i = push.first; i < min(push.last, photon_count); i++) {
+        Photon photon = photons[i];
+        if (accepts(receiver, photon)) {
+            flux += photon.flux_direction.rgb;
+            count += 1u;
+        }
+    }
+    vec4 before = gathered[slot].flux_count;
+    gathered[slot].flux_count = vec4(before.rgb + flux, uintBitsToFloat(floatBitsToUint(before.w) + count));
+}

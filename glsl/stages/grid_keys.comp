@@ -1,0 +1,25 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The bucket of each photon, to be sorted by.
+
+#include "settings.glsl"
+#include "photon.glsl"
+
+#include "grid.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430) readonly buffer Grid { GridShape grid; };
+layout(std430) readonly buffer Photons { Photon photons[]; };
+layout(std430) readonly buffer PhotonCount { uint photon_count; };
+layout(std430) writeonly buffer Keys { uint keys[]; };
+layout(std430) writeonly buffer Values { uint values[]; };
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= photon_count) {
+        return;
+    }
+    keys[i] = bucket_of(cell_of(photons[i].position_object.xyz, grid.inverse_cell_size));
+    values[i] = i;
+}

@@ -1,0 +1,22 @@
+#version 460
+// Counts how many iterations the driver lets a loop make. The bits that are mixed in keep compilers from replacing the
+// loop by its result.
+
+layout(local_size_x = 1) in;
+
+layout(push_constant) uniform Push {
+    uint asked;
+} push;
+
+layout(std430) writeonly buffer ScanTotal { uint scan_total; };
+
+void main() {
+    uint done = 0u;
+    uint mixed = 1u;
+    while (mixed != 0u && done < push.asked) {
+        // A full-period generator over odd numbers: never 0.
+        mixed = mixed * 1664525u | 1u;
+        done += 1u;
+    }
+    scan_total = done;
+}

@@ -1,0 +1,170 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Photon tracing: each invocation (a lane) emits and follows its share of the batch's photon paths, one after the
+// other in one loop, so that no lane of a subgroup waits for another's longer path. A lane stores its photons in a
+// region of its own, which makes their order a pure function of the seed.
+
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "random.glsl"
+#include "scene.glsl"
+#include "intersect.glsl"
+#include "bsdf.glsl"
+#include "light.glsl"
+#include "photon.glsl"
+#include "status.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
+
+layout(push_constant) uniform Push {
+    uint iteration;
+    uint first_path; // of this batch
+    uint path_count;
+} push;
+
+layout(std430) writeonly buffer LanePhotons { Photon lane_photons[]; };
+layout(std430) writeonly buffer LaneCounts { uint lane_counts[]; };
+layout(std430) writeonly buffer LaneOffsets { uint lane_offsets[]; }; // the same, to be summed up
+
+struct Path {
+    vec3 origin;
+    vec3 direction;
+    vec3 flux;
+    uint depth;
+    uint ignored;
+    bool seen_directly; // no specular bounce since the light: direct light, which `direct` samples
+};
+
+Path emit(inout Random random) {
+    vec4 u = next4(random);
+    vec4 w = next4(random);
+    Light light = lights[choose_light(u.x)];
+    Surface emitter = surface_at(light.triangle, triangle_point(u.yz));
+    Material material = materials[emitter.material];
+    vec3 normal = emitter.geometric_normal;
+    if (material.double_sided != 0u && w.z < 0.5) {
+        normal = -normal;
+    }
+    Path path;
+    path.direction = cosine_direction(normal, w.xy);
+    path.origin = offset_origin(emitter.position, normal);
+    // Lights are chosen in proportion to their mean flux, which cancels their area.
+    vec3 emission = material.emission;
+    path.flux = emission * (3.0 * settings.light_flux / (emission.r + emission.g + emission.b));
+    path.depth = 0u;
+    path.ignored = light.triangle;
+    path.seen_directly = true;
+    return path;
+}
+
+// Russian roulette that keeps the photons' powers alike: survives with the ratio of its largest channels.
+bool survives(inout vec3 flux, vec3 scattered, float u) {
+    float probability = min(1.0, largest(scattered) / largest(flux));
+    if (u >= probability) {
+        return false;
+    }
+    flux = scattered / probability;
+    return true;
+}
+
+void main() {
+    uint lane = gl_GlobalInvocationID.x;
+    if (lane >= settings.photon_lanes) {
+        return;
+    }
+    uint stored = 0u;
+    uint next = lane;
+    bool alive = false;
+    Path path;
+    Random random;
+    uint truncated = 0u;
+    uint cut = 0u;
+    uint non_finite = 0u;
+    while (true) {
+        loop_count += 1u;
+        if (!alive) {
+            if (next >= push.path_count) {
+                break;
+            }
+            random = random_for(PHOTON_PATH, push.first_path + next, push.iteration, settings.seed);
+            path = emit(random);
+            next += settings.photon_lanes;
+            alive = true;
+        }
+        Hit hit = trace(path.origin, path.direction, 1e30, path.ignored, false);
+        if (loops_cut) {
+            // This path and those that the lane has not begun.
+            cut = 1u + (push.path_count + settings.photon_lanes - 1u - next) / settings.photon_lanes;
+            break;
+        }
+        if (hit.triangle == MISS) {
+            alive = false;
+            continue;
+        }
+        Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
+        Material material = materials[surface.material];
+        Facing facing = face(surface, path.direction);
+        vec4 u = next4(random);
+        vec3 incoming = path.direction;
+        if (material.surface == MATTE) {
+            // A photon's flux is per area of the surface; the shading normal's cosine replaces the geometric one's:
+            // Veach, «Robust Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
+            float correction = dot(incoming, facing.shading_normal) / dot(incoming, facing.geometric_normal);
+            vec3 flux = path.flux * correction;
+            if (!finite(flux)) {
+                non_finite += 1u;
+            } else if (!(SAMPLE_LIGHTS && path.seen_directly)) {
+                if (stored < settings.lane_capacity) {
+                    Photon photon;
+                    photon.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
+                    photon.flux_direction = vec4(flux, uintBitsToFloat(encode_direction(incoming)));
+                    lane_photons[stored * settings.photon_lanes + lane] = photon;
+                }
+                stored += 1u;
+            }
+            path.seen_directly = false;
+            // Drawn around the geometric normal, the outgoing direction needs no second correction.
+            vec3 outgoing = cosine_direction(facing.geometric_normal, u.xy);
+            vec3 scattered = flux * material.base_color;
+            alive = dot(outgoing, facing.shading_normal) > 0.0 && finite(scattered) &&
+                    survives(path.flux, scattered, u.z);
+            path.direction = outgoing;
+        } else if (material.surface == MIRROR) {
+            float cos_i = -dot(incoming, facing.shading_normal);
+            alive = survives(path.flux, path.flux * fresnel_schlick(material.base_color, cos_i), u.z);
+            path.direction = normalize(incoming + 2.0 * cos_i * facing.shading_normal);
+            path.seen_directly = false;
+        } else {
+            Boundary boundary = meet_boundary(facing, incoming, material.ior);
+            bool reflected = u.x < boundary.reflectance;
+            alive = reflected || survives(path.flux, path.flux * material.base_color, u.z);
+            path.direction = reflected ? boundary.reflected : boundary.refracted;
+            path.seen_directly = false;
+        }
+        path.origin = origin_towards(surface.position, facing.geometric_normal, path.direction);
+        path.ignored = hit.triangle;
+        path.depth += 1u;
+        if (alive && path.depth >= settings.max_depth) {
+            truncated += 1u;
+            alive = false;
+        }
+    }
+    uint kept = min(stored, settings.lane_capacity);
+    lane_counts[lane] = kept;
+    lane_offsets[lane] = kept;
+    atomicMax(status.lane_need, stored);
+    if (stored > settings.lane_capacity) {
+        atomicOr(status.overflow, 1u);
+    }
+    if (truncated > 0u) {
+        atomicAdd(status.truncated_paths, truncated);
+    }
+    if (cut > 0u) {
+        atomicAdd(status.cut_paths, cut);
+    }
+    if (non_finite > 0u) {
+        atomicAdd(status.non_finite, non_finite);
+    }
+}

@@ -1,0 +1,40 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The paper's image synthesis: eq. 4 for each visible point, and the mean of what was seen directly.
+
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(push_constant) uniform Push {
+    uint iterations;
+    float emitted; // photon paths of all iterations
+} push;
+
+layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
+layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
+layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left
+
+void main() {
+    uint pixel_slot = gl_GlobalInvocationID.x;
+    if (pixel_slot >= pixel_slots()) {
+        return;
+    }
+    uvec2 pixel = pixel_of(pixel_slot);
+    if (any(greaterThanEqual(pixel, settings.resolution))) {
+        return;
+    }
+    vec3 radiance = vec3(0.0);
+    for (uint i = 0u; i < settings.slots_per_pixel; i++) {
+        uint slot = pixel_slot * settings.slots_per_pixel + i;
+        Statistics mine = statistics[slot];
+        DirectSum sum = direct_sums[slot];
+        // The quotient of flux and emitted photons comes first: both grow without bound, it doesn't.
+        radiance += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
+        radiance += (mine.flux_high.rgb + mine.flux_low.rgb) / push.emitted / (PI * mine.radius2_high);
+    }
+    film[pixel.y * settings.resolution.x + pixel.x] = vec4(radiance, 1.0);
+}

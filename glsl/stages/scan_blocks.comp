@@ -1,0 +1,38 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Exclusive prefix sums, first of three stages: every workgroup scans a block of 2,048 numbers in place and notes
+// the block's sum.
+
+layout(local_size_x = 128) in;
+
+const uint PER_THREAD = 16u;
+
+layout(push_constant) uniform Push {
+    uint count;
+} push;
+
+layout(std430) buffer Scan { uint scan[]; };
+layout(std430) writeonly buffer ScanSums { uint scan_sums[]; };
+
+#include "workgroup_scan.glsl"
+
+void main() {
+    uint first = (gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationID.x) * PER_THREAD;
+    uint values[PER_THREAD];
+    uint sum = 0u;
+    for (uint i = 0u; i < PER_THREAD; i++) {
+        values[i] = first + i < push.count ? scan[first + i] : 0u;
+        sum += values[i];
+    }
+    uint total;
+    uint before = workgroup_exclusive_scan(sum, total);
+    for (uint i = 0u; i < PER_THREAD; i++) {
+        if (first + i < push.count) {
+            scan[first + i] = before;
+        }
+        before += values[i];
+    }
+    if (gl_LocalInvocationID.x == 0u) {
+        scan_sums[gl_WorkGroupID.x] = total;
+    }
+}

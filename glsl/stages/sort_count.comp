@@ -1,0 +1,35 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Radix sort, first stage of a pass: how often each digit occurs in each tile.
+
+layout(local_size_x = 128) in;
+
+layout(push_constant) uniform Push {
+    uint shift;
+    uint tiles;
+} push;
+
+#include "sort.glsl"
+
+layout(std430) readonly buffer KeysIn { uint keys_in[]; };
+layout(std430) writeonly buffer Histograms { uint histograms[]; }; // digit-major: [digit][tile]
+
+shared uint counts[DIGITS];
+
+void main() {
+    uint me = gl_LocalInvocationID.x;
+    if (me < DIGITS) {
+        counts[me] = 0u;
+    }
+    barrier();
+    for (uint i = 0u; i < KEYS_PER_THREAD; i++) {
+        uint index = gl_WorkGroupID.x * TILE_KEYS + i * gl_WorkGroupSize.x + me;
+        if (index < sort_count) {
+            atomicAdd(counts[digit_of(keys_in[index], push.shift)], 1u);
+        }
+    }
+    barrier();
+    if (me < DIGITS) {
+        histograms[me * push.tiles + gl_WorkGroupID.x] = counts[me];
+    }
+}

@@ -1,0 +1,200 @@
+//! What the user asked for, and every buffer size and group count that follows from it.
+
+use crate::error::{Error, Result};
+
+/// Which visible points an iteration uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Estimator {
+    /// Stochastic progressive photon mapping: new visible points each iteration, statistics shared by the pixel.
+    Sppm,
+    /// Progressive photon mapping as in the paper: visible points found once.
+    Ppm,
+}
+
+/// Where direct light comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Direct {
+    /// A shadow ray to a point of a light.
+    Light,
+    /// Photons, as in the paper.
+    Photons,
+}
+
+/// How rays meet triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Accel {
+    /// A bounding volume hierarchy.
+    Bvh,
+    /// Every triangle, as in the paper.
+    Brute,
+}
+
+/// A render's settings.
+#[derive(Debug, Clone)]
+pub struct RenderConfig {
+    /// Pixels, width and height.
+    pub resolution: [u32; 2],
+    /// Photon paths emitted in an iteration.
+    pub photons: u32,
+    /// Which visible points an iteration uses.
+    pub estimator: Estimator,
+    /// Where direct light comes from.
+    pub direct: Direct,
+    /// Eq. 2's α, between 0 and 1.
+    pub alpha: f32,
+    /// Initial radius in scene units; automatic if `None`.
+    pub radius: Option<f64>,
+    /// Index into [`crate::gather::METHODS`].
+    pub gather: usize,
+    /// How rays meet triangles.
+    pub accel: Accel,
+    /// Bounces of a path at the most.
+    pub max_depth: u32,
+    /// Seed of all random numbers.
+    pub seed: u32,
+}
+
+impl Default for RenderConfig {
+    fn default() -> Self {
+        Self {
+            resolution: [1280, 720],
+            photons: 100_000,
+            estimator: Estimator::Sppm,
+            direct: Direct::Light,
+            alpha: 2.0 / 3.0,
+            radius: None,
+            gather: crate::gather::default_method(),
+            accel: Accel::Bvh,
+            max_depth: 64,
+            seed: 0,
+        }
+    }
+}
+
+/// Pixels of a picture's side at the most.
+const MAX_SIDE: u32 = 16384;
+
+impl RenderConfig {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// The first setting outside its range.
+    pub fn check(&self) -> Result<()> {
+        let [width, height] = self.resolution;
+        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+            return Err(Error::Config(format!(
+                "--resolution {width}x{height}: each side must lie between 1 and {MAX_SIDE}"
+            )));
+        }
+        if !(self.alpha > 0.0 && self.alpha < 1.0) {
+            return Err(Error::Config(format!("--alpha {}: must lie between 0 and 1, both excluded", self.alpha)));
+        }
+        if let Some(radius) = self.radius
+            && !(radius > 0.0 && radius.is_finite())
+        {
+            return Err(Error::Config(format!("--radius {radius}: must be above 0")));
+        }
+        if self.photons == 0 {
+            return Err(Error::Config("--photons 0: at least one photon path is needed".to_owned()));
+        }
+        if self.max_depth == 0 {
+            return Err(Error::Config("--max-depth 0: at least one bounce is needed".to_owned()));
+        }
+        Ok(())
+    }
+}
+
+/// Pixels of a tile's side: visible points lie in memory tile by tile.
+pub const TILE: u32 = 8;
+/// Visible points of a pixel where they are found once: glass splits the path while a slot is free.
+pub const PPM_SLOTS: u32 = 8;
+/// Photons that one dispatch of the naive gather tests at the most, below every known driver's loop limit.
+pub const NAIVE_RANGE: u32 = 16_000;
+/// Numbers of a block of the prefix sum.
+pub const SCAN_BLOCK: u32 = 2048;
+/// Keys of a tile of the radix sort.
+pub const SORT_TILE: u32 = 2048;
+/// Bits of a digit of the radix sort.
+pub const SORT_DIGIT_BITS: u32 = 4;
+
+/// Sizes of a render's buffers, in elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Slots for pixels: whole tiles.
+    pub pixel_slots: u32,
+    /// Visible points a pixel.
+    pub slots_per_pixel: u32,
+    /// Photon paths of a batch.
+    pub batch_paths: u32,
+    /// Invocations of the photon stage.
+    pub photon_lanes: u32,
+    /// Photons that one of them can store.
+    pub lane_capacity: u32,
+    /// log2 of the grid's buckets.
+    pub cell_bits: u32,
+}
+
+/// What of a device the sizes depend on.
+#[derive(Debug, Clone, Copy)]
+pub struct DeviceLimits {
+    /// Bytes that one storage buffer binding can span.
+    pub storage_buffer_bytes: u64,
+    /// Loop iterations that an invocation is given.
+    pub loop_limit: u32,
+    /// Invocations that keep the device busy.
+    pub lanes: u32,
+}
+
+/// Photons that a path leaves behind on average; more are noticed and make the buffers grow.
+const EXPECTED_PHOTONS: f64 = 5.0;
+
+impl Sizes {
+    /// The sizes for a render.
+    pub fn new(config: &RenderConfig, limits: DeviceLimits) -> Self {
+        let [width, height] = config.resolution;
+        let slots_per_pixel = match config.estimator {
+            Estimator::Sppm => 1,
+            Estimator::Ppm => PPM_SLOTS,
+        };
+        let photons_at_most = (limits.storage_buffer_bytes / size_of::<crate::layout::Photon>() as u64) as u32;
+        let batch_paths = config.photons.min((f64::from(photons_at_most) / (2.0 * EXPECTED_PHOTONS)) as u32).max(1);
+        let mut sizes = Self {
+            pixel_slots: width.div_ceil(TILE) * height.div_ceil(TILE) * TILE * TILE,
+            slots_per_pixel,
+            batch_paths,
+            photon_lanes: 0,
+            lane_capacity: 0,
+            cell_bits: (f64::from(batch_paths).log2().round() as u32).clamp(8, 20).next_multiple_of(SORT_DIGIT_BITS),
+        };
+        sizes.set_lanes(limits.lanes);
+        sizes
+    }
+
+    /// Deals the paths to about `lanes` invocations.
+    pub fn set_lanes(&mut self, lanes: u32) {
+        self.photon_lanes = self.batch_paths.min(lanes.next_multiple_of(64));
+        let paths = f64::from(self.paths_per_lane());
+        // Mean and a few standard deviations of a sum of geometrically distributed lengths.
+        self.lane_capacity = (EXPECTED_PHOTONS * (paths + 3.0 * paths.sqrt())).ceil() as u32;
+    }
+
+    /// Photon paths that an invocation follows one after the other, at the most.
+    pub fn paths_per_lane(&self) -> u32 {
+        self.batch_paths.div_ceil(self.photon_lanes)
+    }
+
+    /// Visible points.
+    pub fn slots(&self) -> u32 {
+        self.pixel_slots * self.slots_per_pixel
+    }
+
+    /// Photons that a batch can store.
+    pub fn photon_capacity(&self) -> u32 {
+        self.photon_lanes * self.lane_capacity
+    }
+
+    /// Batches of an iteration of `paths` photon paths.
+    pub fn batches(&self, paths: u32) -> u32 {
+        paths.div_ceil(self.batch_paths)
+    }
+}

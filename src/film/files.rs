@@ -1,0 +1,162 @@
+//! Output files that are whole or absent.
+
+use crate::error::{Error, Result};
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, is_separator};
+use tempfile::NamedTempFile;
+
+/// Checks that a file can be written at `path`, and leaves nothing behind: to be called before a long rendering.
+///
+/// # Errors
+/// A path that names no file, a folder, or something else than a regular file; a file that may not be overwritten; a
+/// folder that doesn't exist or can't be written to.
+pub fn check_writable(path: &Path) -> Result<()> {
+    temporary_beside(path).map(drop)
+}
+
+/// Writes `bytes` to `path`, whole or not at all: to a temporary file in the same folder, which is then renamed.
+///
+/// # Errors
+/// As [`check_writable`]; further if the disk is full.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let failed = |error: io::Error| {
+        Error::file(
+            path,
+            format!("can't be written ({error}): check the disk's free space and permissions"),
+        )
+    };
+    let mut temporary = temporary_beside(path)?;
+    temporary.write_all(bytes).map_err(failed)?;
+    // Without it a power cut soon after the renaming could leave an empty file of the right name.
+    temporary.as_file().sync_all().map_err(failed)?;
+    temporary.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+/// A temporary file in `path`'s folder, deleted when dropped, after checking that it can be renamed to `path`.
+fn temporary_beside(path: &Path) -> Result<NamedTempFile> {
+    let unwritable = |what: String| Error::file(path, format!("can't be written: {what}"));
+    let names_a_folder = path.to_string_lossy().ends_with(is_separator);
+    if names_a_folder || path.file_name().is_none() || path.is_dir() {
+        return Err(unwritable("it names a folder; name a file in it".to_owned()));
+    }
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    if !folder.is_dir() {
+        return Err(unwritable(format!(
+            "there is no folder {}; create it or name another",
+            folder.display()
+        )));
+    }
+    match fs::metadata(path) {
+        // Renaming would replace a device or a pipe (/dev/null!) by a file.
+        Ok(existing) if !existing.is_file() => {
+            return Err(unwritable("it is no regular file; name another".to_owned()));
+        }
+        // Renaming asks for permission to change the folder, not the file.
+        Ok(_) => {
+            File::options()
+                .write(true)
+                .open(path)
+                .map_err(|error| unwritable(format!("{error}; change its permissions or name another")))?;
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => return Err(unwritable(format!("{error}; name another"))),
+    }
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".ppm-vk-");
+    // A temporary file is its owner's alone by default, and renaming keeps that; the umask still applies to this.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder).map_err(|error| {
+        unwritable(format!(
+            "no file can be created in the folder {} ({}); change its permissions or name another",
+            folder.display(),
+            error.kind()
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+    use tempfile::tempdir;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .expect("a folder")
+            .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_is_replaced_whole_and_nothing_else_is_left() {
+        let folder = tempdir().expect("a temporary folder");
+        let path = folder.path().join("out");
+        for content in ["a first, longer content", "a second"] {
+            write_whole(&path, content.as_bytes()).expect("a file");
+            assert_eq!(fs::read_to_string(&path).expect("a file"), content);
+        }
+        assert_eq!(names(folder.path()), ["out"]);
+    }
+
+    #[test]
+    fn checking_a_path_changes_nothing() {
+        let folder = tempdir().expect("a temporary folder");
+        let old = folder.path().join("old");
+        fs::write(&old, "content").expect("a file");
+        check_writable(&old).expect("writable");
+        check_writable(&folder.path().join("new")).expect("writable");
+        assert_eq!(fs::read_to_string(&old).expect("a file"), "content");
+        assert_eq!(names(folder.path()), ["old"]);
+    }
+
+    #[test]
+    fn an_unwritable_path_is_one_clear_line_before_and_after_the_work() {
+        let folder = tempdir().expect("a temporary folder");
+        let folder = folder.path();
+        let file = folder.join("file");
+        fs::write(&file, "").expect("a file");
+        let mut cases = vec![
+            (folder.to_owned(), "it names a folder"),
+            (folder.join("new/"), "it names a folder"),
+            (PathBuf::new(), "it names a folder"),
+            (folder.join("missing/out.exr"), "there is no folder"),
+            (file.join("out.exr"), "there is no folder"),
+            (folder.join("x".repeat(300)), "name another"),
+        ];
+        if cfg!(target_os = "linux") {
+            cases.push(("/dev/null".into(), "no regular file"));
+            cases.push(("/proc/out.exr".into(), "no file can be created in the folder /proc"));
+        }
+        for (path, expected) in cases {
+            let error = |result: Result<()>| result.expect_err("an error").to_string();
+            let checked = error(check_writable(&path));
+            assert!(
+                checked.contains(expected) && !checked.contains('\n'),
+                "{}: {checked}",
+                path.display()
+            );
+            assert_eq!(error(write_whole(&path, b"content")), checked);
+        }
+        assert_eq!(names(folder), ["file"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_has_the_mode_of_any_new_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempdir().expect("a temporary folder");
+        let (whole, plain) = (folder.path().join("whole"), folder.path().join("plain"));
+        write_whole(&whole, b"").expect("a file");
+        fs::write(&plain, "").expect("a file");
+        let mode = |path: &Path| fs::metadata(path).expect("a file").permissions().mode();
+        assert_eq!(mode(&whole), mode(&plain), "the temporary file's mode stayed");
+    }
+}

@@ -1,0 +1,448 @@
+//! Pictures as OpenEXR files.
+
+use super::{Image, Metadata, write_whole};
+use crate::error::{Error, Result};
+use exr::block::reader::Reader;
+use exr::image::read::image::ReadLayers;
+use exr::image::read::layers::ReadChannels;
+use exr::image::read::specific_channels::ReadSpecificChannel;
+use exr::image::write::WritableImage;
+use exr::image::{Blocks, Encoding, Layer, SpecificChannels};
+use exr::math::Vec2;
+use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
+use exr::meta::header::{Header, LayerAttributes};
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, BufReader, Cursor};
+use std::path::Path;
+
+/// Pictures with more pixels than this (16,384 × 8,192) are taken for damaged files.
+const MAX_PIXELS: usize = 1 << 27;
+
+/// Primaries and white point of Rec. ITU-R BT.709 in CIE xy: what the program means by linear RGB.
+const REC_709: Chromaticities = Chromaticities {
+    red: Vec2(0.64, 0.33),
+    green: Vec2(0.30, 0.60),
+    blue: Vec2(0.15, 0.06),
+    white: Vec2(0.3127, 0.3290),
+};
+
+/// The custom attributes of the header. OpenEXR's integers end at 2³¹ − 1, so counts and the seed are text.
+fn custom_attributes(metadata: &Metadata) -> HashMap<Text, AttributeValue> {
+    let text = |value: &str| AttributeValue::Text(Text::from_slice_unchecked(value.as_bytes()));
+    let mut attributes = HashMap::from([
+        (Text::from("iterations"), text(&metadata.iterations.to_string())),
+        (
+            Text::from("photonsEmitted"),
+            text(&metadata.photons_emitted.to_string()),
+        ),
+        (Text::from("seed"), text(&metadata.seed.to_string())),
+        (Text::from("device"), text(&metadata.device)),
+        (Text::from("seconds"), AttributeValue::F64(metadata.seconds)),
+    ]);
+    if let Some(error) = metadata.estimated_error {
+        attributes.insert(Text::from("estimatedError"), AttributeValue::F64(error));
+    }
+    attributes
+}
+
+/// Writes a scanline OpenEXR file: 32-bit float R, G, B, ZIP compression over 16 lines (lossless), the chromaticities
+/// of Rec. 709, the program's version as `software`, and `metadata` as the attributes `iterations`, `photonsEmitted`,
+/// `seed` (decimal text), `device`, `seconds` and, if known, `estimatedError` (double).
+///
+/// The same picture and metadata give the same bytes. NaN and infinity are written as they are.
+///
+/// # Errors
+/// As [`check_writable`](super::check_writable); further if the disk is full.
+pub fn write_exr(image: &Image, path: &Path, metadata: &Metadata) -> Result<()> {
+    let attributes = LayerAttributes {
+        software_name: Some(Text::from(concat!("ppm-vk ", env!("CARGO_PKG_VERSION")))),
+        other: custom_attributes(metadata),
+        ..LayerAttributes::default()
+    };
+    let encoding = Encoding {
+        compression: exr::compression::Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let channels = SpecificChannels::rgb(|Vec2(x, y): Vec2<usize>| {
+        let [r, g, b] = image.pixels[y * image.width + x];
+        (r, g, b)
+    });
+    let size = (image.width, image.height);
+    let mut picture = exr::image::Image::from_layer(Layer::new(size, attributes, encoding, channels));
+    picture.attributes.chromaticities = Some(REC_709);
+
+    let mut file = Vec::new();
+    picture
+        .write()
+        .to_buffered(Cursor::new(&mut file))
+        .map_err(|error| Error::file(path, format!("can't be encoded as OpenEXR: {error}")))?;
+    sort_attributes(&mut file);
+    write_whole(path, &file)
+}
+
+/// Puts the attributes of an EXR file's header into alphabetical order, as the OpenEXR library does: the `exr` crate
+/// keeps custom ones in a hash map, whose order differs from run to run.
+fn sort_attributes(file: &mut [u8]) {
+    /// Bytes of the attribute at the start of `header`: name, 0, type, 0, size, value. `None` at the header's end.
+    fn attribute_length(header: &[u8]) -> Option<usize> {
+        let text_length = |start: usize| header.get(start..)?.iter().position(|&byte| byte == 0);
+        let name = text_length(0).filter(|&length| length > 0)? + 1;
+        let kind = name + text_length(name)? + 1;
+        let (size, _) = header.get(kind..)?.split_first_chunk()?;
+        Some(kind + 4 + u32::from_le_bytes(*size) as usize)
+    }
+
+    const MAGIC_AND_VERSION: usize = 8;
+    let header = &mut file[MAGIC_AND_VERSION..];
+    let mut attributes = Vec::new();
+    let mut rest = &*header;
+    while let Some((attribute, behind)) = attribute_length(rest).and_then(|length| rest.split_at_checked(length)) {
+        attributes.push(attribute);
+        rest = behind;
+    }
+    attributes.sort_unstable();
+    let sorted = attributes.concat();
+    header[..sorted.len()].copy_from_slice(&sorted);
+}
+
+/// Reads the first layer with channels R, G and B of an OpenEXR file; half, float and integer samples become `f32`,
+/// other channels are left out.
+///
+/// The picture is the file's display window: pixels that the data window lacks are black, what lies outside is cut.
+///
+/// # Errors
+/// A file that can't be opened, is damaged or cut short, has no RGB layer, has subsampled channels, or has more than
+/// 2²⁷ pixels.
+pub fn read_exr(path: &Path) -> Result<Image> {
+    let damaged = |error: exr::error::Error| {
+        Error::file(
+            path,
+            format!("can't be read as OpenEXR ({error}): is it another format, or cut short?"),
+        )
+    };
+    let file = File::open(path).map_err(|error| {
+        Error::file(
+            path,
+            format!("can't be opened ({error}): check the path and its permissions"),
+        )
+    })?;
+    let reader = exr::block::read(BufReader::new(file), false).map_err(damaged)?;
+    check_headers(&reader).map_err(|what| Error::file(path, what))?;
+
+    let picture = exr::image::read::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .specific_channels()
+        .required("R")
+        .required("G")
+        .required("B")
+        .collect_pixels(
+            |Vec2(width, height), _| Image::new(width, height, vec![[0.0; 3]; width * height]),
+            |image, Vec2(x, y), (r, g, b): (f32, f32, f32)| image.pixels[y * image.width + x] = [r, g, b],
+        )
+        .first_valid_layer()
+        .all_attributes()
+        // A decoder that panics over a damaged file would abort the process from one of rayon's threads.
+        .non_parallel()
+        .from_chunks(reader)
+        .map_err(damaged)?;
+    let layer = picture.layer_data;
+    let (position, display) = (layer.attributes.layer_position, picture.attributes.display_window);
+    Ok(crop(layer.channel_data.pixels, position, display))
+}
+
+/// Refuses what the `exr` crate would spend all memory on or can't do, before any pixel is read.
+fn check_headers<R: io::Read + io::Seek>(reader: &Reader<R>) -> std::result::Result<(), &'static str> {
+    let is_sound = |Vec2(width, height): Vec2<usize>| {
+        width
+            .checked_mul(height)
+            .is_some_and(|pixels| (1..=MAX_PIXELS).contains(&pixels))
+    };
+    let subsampled = |header: &Header| {
+        let channels = &header.channels.list;
+        channels.iter().any(|c| c.sampling != Vec2(1, 1))
+    };
+    for header in reader.headers() {
+        if !is_sound(header.layer_size) || !is_sound(header.shared_attributes.display_window.size) {
+            return Err("has no pixels or more than 134 million: damaged, or scale it down first");
+        }
+        if subsampled(header) {
+            return Err("has channels of lower resolution: convert it to full resolution RGB first");
+        }
+    }
+    Ok(())
+}
+
+/// The part of a picture whose top left pixel lies at `position` that `display` shows; black where it has no pixels.
+fn crop(image: Image, position: Vec2<i32>, display: IntegerBounds) -> Image {
+    let Vec2(width, height) = display.size;
+    if (position, image.width, image.height) == (display.position, width, height) {
+        return image;
+    }
+    let source = |shown: usize, display: i32, position: i32, size: usize| {
+        usize::try_from(shown as i64 + i64::from(display) - i64::from(position))
+            .ok()
+            .filter(|&index| index < size)
+    };
+    let column = |x| source(x, display.position.x(), position.x(), image.width);
+    let row = |y| source(y, display.position.y(), position.y(), image.height);
+    let pixel = |x, y| Some(image.pixels[row(y)? * image.width + column(x)?]);
+    let pixels = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| pixel(x, y).unwrap_or_default())
+        .collect();
+    Image::new(width, height, pixels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics;
+    use exr::block::samples::Sample;
+    use exr::image::{AnyChannel, AnyChannels, FlatSamples};
+    use exr::meta::MetaData;
+    use std::fs;
+    use std::path::PathBuf;
+    use tempfile::TempDir;
+
+    fn metadata() -> Metadata {
+        Metadata {
+            iterations: 256,
+            photons_emitted: u64::MAX,
+            seed: 1 << 53 | 1,
+            device: "llvmpipe (LLVM 15, 256 bits) – µ".to_owned(),
+            seconds: 12.3456789012345,
+            estimated_error: None,
+        }
+    }
+
+    /// A picture with values that a lossy or half-float file would not keep.
+    fn picture() -> Image {
+        let (width, height) = (3, 21);
+        let pixels = (0..width * height)
+            .map(|i| [i as f32 / 3.0, 1e-30 * i as f32, 1e30 - i as f32])
+            .collect();
+        Image::new(width, height, pixels)
+    }
+
+    fn written(image: &Image, metadata: &Metadata) -> (TempDir, PathBuf) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("out.exr");
+        write_exr(image, &path, metadata).expect("an EXR file");
+        (folder, path)
+    }
+
+    fn attributes(path: &Path) -> LayerAttributes {
+        let meta = MetaData::read_from_file(path, true).expect("a header");
+        meta.headers[0].own_attributes.clone()
+    }
+
+    /// The error's one line.
+    fn line<T>(result: Result<T>) -> String {
+        let line = result.err().expect("an error").to_string();
+        assert!(!line.contains('\n'), "not one line: {line}");
+        line
+    }
+
+    #[test]
+    fn an_exr_keeps_every_bit_of_every_pixel() {
+        let mut image = picture();
+        image.pixels[5] = [f32::NAN, f32::INFINITY, -0.0];
+        let (_folder, path) = written(&image, &metadata());
+        let read = read_exr(&path).expect("a picture");
+        assert_eq!((read.width, read.height), (image.width, image.height));
+        let bits = |image: &Image| image.pixels.iter().map(|p| p.map(f32::to_bits)).collect::<Vec<_>>();
+        assert_eq!(bits(&read), bits(&image));
+    }
+
+    #[test]
+    fn the_header_says_how_the_picture_was_made() {
+        let (_folder, path) = written(&picture(), &metadata());
+        let own = attributes(&path);
+        let text = |name: &str| match own.other.get(&Text::from(name)) {
+            Some(AttributeValue::Text(text)) => String::from_utf8(text.as_slice().to_vec()).expect("UTF-8"),
+            other => panic!("attribute {name} is {other:?}"),
+        };
+        let expected = metadata();
+        assert_eq!(text("iterations"), "256");
+        assert_eq!(text("photonsEmitted"), u64::MAX.to_string(), "not exact");
+        assert_eq!(text("seed"), expected.seed.to_string(), "not exact");
+        assert_eq!(text("device"), expected.device);
+        let seconds = own.other.get(&Text::from("seconds"));
+        assert_eq!(seconds, Some(&AttributeValue::F64(expected.seconds)));
+        let software = own.software_name.map(|name| name.to_string());
+        assert_eq!(software, Some(format!("ppm-vk {}", env!("CARGO_PKG_VERSION"))));
+        let meta = MetaData::read_from_file(&path, true).expect("a header");
+        assert_eq!(meta.headers[0].shared_attributes.chromaticities, Some(REC_709));
+    }
+
+    #[test]
+    fn the_estimated_error_is_written_only_where_it_is_known() {
+        let error = |metadata: &Metadata| {
+            let (_folder, path) = written(&picture(), metadata);
+            attributes(&path).other.remove(&Text::from("estimatedError"))
+        };
+        assert_eq!(error(&metadata()), None);
+        let known = Metadata {
+            estimated_error: Some(0.01),
+            ..metadata()
+        };
+        assert_eq!(error(&known), Some(AttributeValue::F64(0.01)));
+    }
+
+    #[test]
+    fn the_same_picture_and_metadata_give_the_same_bytes() {
+        let bytes = || fs::read(written(&picture(), &metadata()).1);
+        let first = bytes().expect("a file");
+        for _ in 0..8 {
+            assert!(bytes().expect("a file") == first, "look at sort_attributes");
+        }
+    }
+
+    /// Writes an EXR file with the `exr` crate: channels of one sample type, and where the data and the picture lie.
+    fn foreign(names: &[&str], sample: Sample, data: IntegerBounds, display: IntegerBounds) -> (TempDir, PathBuf) {
+        let count = data.size.area();
+        let samples = || match sample {
+            Sample::F16(value) => FlatSamples::F16(vec![value; count]),
+            Sample::F32(value) => FlatSamples::F32(vec![value; count]),
+            Sample::U32(value) => FlatSamples::U32(vec![value; count]),
+        };
+        let channels = names.iter().map(|&name| AnyChannel::new(name, samples()));
+        let layer = Layer::new(
+            data.size,
+            LayerAttributes::default().with_position(data.position),
+            Encoding::FAST_LOSSLESS,
+            AnyChannels::sort(channels.collect()),
+        );
+        let mut image = exr::image::Image::from_layer(layer);
+        image.attributes.display_window = display;
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("foreign.exr");
+        image.write().to_file(&path).expect("an EXR file");
+        (folder, path)
+    }
+
+    #[test]
+    fn half_float_and_integer_channels_are_read_with_or_without_alpha() {
+        let window = IntegerBounds::new((0, 0), (5, 3));
+        let expected = Image::new(5, 3, vec![[2.0; 3]; 15]);
+        let half = Sample::F16(exr::prelude::f16::from_f32(2.0));
+        for (kind, (_folder, path)) in [
+            ("half", foreign(&["A", "B", "G", "R"], half, window, window)),
+            (
+                "float",
+                foreign(&["R", "G", "B", "Z"], Sample::F32(2.0), window, window),
+            ),
+            ("integer", foreign(&["R", "G", "B"], Sample::U32(2), window, window)),
+        ] {
+            assert_eq!(read_exr(&path).expect(kind), expected, "{kind}");
+        }
+    }
+
+    #[test]
+    fn a_picture_is_its_display_window() {
+        let display = IntegerBounds::new((10, 20), (3, 2));
+        let lit = |data: IntegerBounds| {
+            let (_folder, path) = foreign(&["R", "G", "B"], Sample::F32(1.0), data, display);
+            let image = read_exr(&path).expect("a picture");
+            assert_eq!((image.width, image.height), (3, 2));
+            image.pixels.iter().map(|pixel| pixel[0]).collect::<Vec<_>>()
+        };
+        let covering = lit(IntegerBounds::new((8, 19), (9, 9)));
+        assert_eq!(covering, [1.0; 6], "data around the picture is cut");
+        let corner = lit(IntegerBounds::new((11, 21), (9, 9)));
+        assert_eq!(corner, [0.0, 0.0, 0.0, 0.0, 1.0, 1.0], "what is missing is black");
+        let outside = lit(IntegerBounds::new((-5, -5), (2, 2)));
+        assert_eq!(outside, [0.0; 6]);
+    }
+
+    #[test]
+    fn a_file_that_is_no_rgb_exr_is_one_clear_line() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let text = folder.path().join("text.exr");
+        fs::write(&text, "no picture at all").expect("a file");
+        let window = IntegerBounds::new((0, 0), (5, 3));
+        let (_grey_folder, grey) = foreign(&["Y"], Sample::F32(1.0), window, window);
+        let missing = folder.path().join("missing.exr");
+        for (path, expected) in [
+            (text.as_path(), "can't be read as OpenEXR"),
+            (grey.as_path(), "can't be read as OpenEXR"),
+            (missing.as_path(), "can't be opened"),
+            (folder.path(), "can't be"),
+        ] {
+            let error = line(read_exr(path));
+            assert!(error.contains(expected), "{}: {error}", path.display());
+        }
+    }
+
+    #[test]
+    fn a_truncated_exr_is_one_line_at_any_length() {
+        let (folder, path) = written(&picture(), &metadata());
+        let whole = fs::read(path).expect("a file");
+        let cut = folder.path().join("cut.exr");
+        for length in 0..whole.len() {
+            fs::write(&cut, &whole[..length]).expect("a file");
+            let error = line(read_exr(&cut));
+            assert!(error.contains("can't be read as OpenEXR"), "{length} bytes: {error}");
+        }
+    }
+
+    #[test]
+    fn a_damaged_exr_header_never_panics() {
+        let (folder, path) = written(&picture(), &metadata());
+        let whole = fs::read(path).expect("a file");
+        let damaged = folder.path().join("damaged.exr");
+        for position in 0..700 {
+            for byte in [0x00, 0x01, 0x7f, 0xff] {
+                let mut bytes = whole.clone();
+                bytes[position] = byte;
+                fs::write(&damaged, &bytes).expect("a file");
+                // Some damage is not to be seen, such as a letter of the device's name.
+                let _ = read_exr(&damaged);
+            }
+        }
+    }
+
+    #[test]
+    fn an_absurd_size_is_refused_before_memory_is_asked_for() {
+        const SIDE: u32 = 1 << 24;
+        let (folder, path) = written(&picture(), &metadata());
+        let mut bytes = fs::read(path).expect("a file");
+        let mut set = |attribute: &[u8], offset: usize, values: &[u32]| {
+            let name = bytes.windows(attribute.len()).position(|window| window == attribute);
+            let value = name.expect("the attribute") + attribute.len() + 4 + offset;
+            bytes[value..value + 4 * values.len()].copy_from_slice(bytemuck::cast_slice(values));
+        };
+        set(b"dataWindow\0box2i\0", 8, &[SIDE - 1; 2]);
+        set(b"displayWindow\0box2i\0", 8, &[SIDE - 1; 2]);
+        set(b"chunkCount\0int\0", 0, &[SIDE / 16]);
+        let absurd = folder.path().join("absurd.exr");
+        fs::write(&absurd, &bytes).expect("a file");
+        let error = line(read_exr(&absurd));
+        assert!(error.contains("more than 134 million"), "{error}");
+    }
+
+    #[test]
+    fn the_references_have_the_means_that_their_notes_state() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/references");
+        let Ok(entries) = fs::read_dir(folder) else {
+            return; // only where the references are
+        };
+        let paths = entries.map(|entry| entry.expect("an entry").path());
+        for path in paths.filter(|path| path.extension().is_some_and(|e| e == "exr")) {
+            let image = read_exr(&path).expect("a reference");
+            assert_eq!((image.width, image.height), (256, 256), "{}", path.display());
+            let note = fs::read(path.with_extension("json")).expect("a note");
+            let note: serde_json::Value = serde_json::from_slice(&note).expect("JSON");
+            for (channel, mean) in metrics::mean(&image).into_iter().enumerate() {
+                let Some(stated) = note["mean"][channel].as_f64() else {
+                    continue; // pool's note states none
+                };
+                let difference = (mean - stated).abs();
+                assert!(difference < 1e-4, "{} {channel}: {mean}, not {stated}", path.display());
+            }
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Pictures as PNG files, tone-mapped for looking at.
+
+use super::{Image, write_whole};
+use crate::error::{Error, Result};
+use image::ImageEncoder;
+use std::path::Path;
+
+/// Writes an 8-bit sRGB PNG: radiance times 2^`exposure_ev`, the Khronos PBR Neutral tone mapper, the sRGB transfer
+/// function, rounding without dither.
+///
+/// NaN and negative values come out as 0, infinity as the brightest value.
+///
+/// # Errors
+/// As [`check_writable`](super::check_writable); further if the disk is full.
+pub fn write_png(image: &Image, path: &Path, exposure_ev: f32) -> Result<()> {
+    let cannot_encode = |what: String| Error::file(path, format!("can't be encoded as PNG: {what}"));
+    let side = |pixels: usize| u32::try_from(pixels).map_err(|error| cannot_encode(error.to_string()));
+    let gain = exposure_ev.exp2();
+    let bytes: Vec<u8> = image
+        .pixels
+        .iter()
+        .flat_map(|pixel| tone_map(pixel.map(|radiance| radiance * gain)))
+        .map(|intensity| (srgb_transfer(intensity) * 255.0).round() as u8)
+        .collect();
+
+    let mut file = Vec::new();
+    image::codecs::png::PngEncoder::new(&mut file)
+        .write_image(
+            &bytes,
+            side(image.width)?,
+            side(image.height)?,
+            image::ExtendedColorType::Rgb8,
+        )
+        .map_err(|error| cannot_encode(error.to_string()))?;
+    write_whole(path, &file)
+}
+
+/// Khronos PBR Neutral tone mapper (github.com/KhronosGroup/ToneMapping, PBR_Neutral): keeps hue and contrast up to
+/// 0.8, then compresses the peak channel towards 1 and desaturates. Maps any input to 0 ..= 1.
+fn tone_map(radiance: [f32; 3]) -> [f32; 3] {
+    const START_COMPRESSION: f32 = 0.8 - 0.04;
+    const DESATURATION: f32 = 0.15;
+    /// Stands for infinity; far above what a display can tell apart, far below where f32 overflows.
+    const BRIGHTEST: f32 = 1e20;
+
+    // NaN fails the comparison.
+    let color = radiance.map(|value| if value > 0.0 { value.min(BRIGHTEST) } else { 0.0 });
+    let darkest = color.into_iter().fold(BRIGHTEST, f32::min);
+    // What a dielectric of base colour 0 reflects at normal incidence, 0.04, is taken out of the shadows.
+    let offset = if darkest < 0.08 {
+        darkest - 6.25 * darkest * darkest
+    } else {
+        0.04
+    };
+    let color = color.map(|value| value - offset);
+    let peak = color.into_iter().fold(0.0, f32::max);
+    if peak < START_COMPRESSION {
+        return color;
+    }
+    let range = 1.0 - START_COMPRESSION;
+    let new_peak = 1.0 - range * range / (peak + range - START_COMPRESSION);
+    let whiteness = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    color.map(|value| {
+        let compressed = value * (new_peak / peak);
+        compressed + (new_peak - compressed) * whiteness
+    })
+}
+
+/// The transfer function of IEC 61966-2-1 (sRGB): linear intensity in 0 ..= 1 to the signal in 0 ..= 1.
+fn srgb_transfer(intensity: f32) -> f32 {
+    if intensity <= 0.003_130_8 {
+        12.92 * intensity
+    } else {
+        1.055 * intensity.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// The 8-bit pixels of a picture's PNG.
+    fn shown(pixels: Vec<[f32; 3]>, exposure_ev: f32) -> Vec<[u8; 3]> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("out.png");
+        let image = Image::new(pixels.len(), 1, pixels);
+        write_png(&image, &path, exposure_ev).expect("a PNG file");
+        let bytes = fs::read(path).expect("a file");
+        let decoded = image::load_from_memory(&bytes).expect("a PNG").into_rgb8();
+        decoded.pixels().map(|pixel| pixel.0).collect()
+    }
+
+    #[test]
+    fn the_png_follows_the_srgb_curve_below_the_shoulder() {
+        // Intensities after the tone mapper's offset of 0.04, and their sRGB signals: 0.2 → 0.4845, 0.5 → 0.7354.
+        assert_eq!(shown(vec![[0.24; 3], [0.54; 3]], 0.0), [[124; 3], [188; 3]]);
+        assert_eq!(shown(vec![[0.12; 3]], 1.0), [[124; 3]], "one stop doubles");
+        assert_eq!(shown(vec![[0.0; 3]], 5.0), [[0; 3]]);
+    }
+
+    #[test]
+    fn the_png_keeps_hues_and_order_of_brightness() {
+        let red = shown(vec![[0.63, 0.065, 0.05], [6.3, 0.65, 0.5]], 0.0);
+        for [r, g, b] in &red {
+            assert!(r > g && g >= b, "red became {red:?}");
+        }
+        let ramp: Vec<_> = (0..200).map(|i| [i as f32 * 0.05; 3]).collect();
+        assert!(shown(ramp, 0.0).is_sorted(), "brighter came out darker");
+    }
+
+    #[test]
+    fn the_png_takes_any_value() {
+        let extremes = vec![
+            [f32::NAN; 3],
+            [f32::NEG_INFINITY, -1.0, -0.0],
+            [f32::INFINITY; 3],
+            [f32::MAX; 3],
+            [f32::INFINITY, 0.0, f32::NAN],
+        ];
+        let pixels = shown(extremes.clone(), 0.0);
+        assert_eq!(pixels[..4], [[0; 3], [0; 3], [255; 3], [255; 3]]);
+        assert_eq!(pixels[4][0], 255);
+        shown(extremes, f32::INFINITY);
+    }
+}

@@ -1,0 +1,73 @@
+//! A buffer with its memory.
+
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+
+use super::context::{Context, OrVulkan};
+use crate::error::{Error, Result};
+
+pub(super) struct Buffer {
+    pub handle: vk::Buffer,
+    pub bytes: u64,
+    allocation: Option<Allocation>,
+}
+
+impl Buffer {
+    pub fn new(context: &Context, name: &str, bytes: u64, location: MemoryLocation) -> Result<Self> {
+        let usage = match location {
+            MemoryLocation::GpuOnly => {
+                vk::BufferUsageFlags::STORAGE_BUFFER
+                    | vk::BufferUsageFlags::UNIFORM_BUFFER
+                    | vk::BufferUsageFlags::TRANSFER_SRC
+                    | vk::BufferUsageFlags::TRANSFER_DST
+            }
+            _ => vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST,
+        };
+        let create = vk::BufferCreateInfo::default().size(bytes.max(4)).usage(usage);
+        // SAFETY: the context outlives the buffer: Device frees its buffers before the context.
+        unsafe {
+            let handle = context.device.create_buffer(&create, None).or_vulkan("vkCreateBuffer")?;
+            let requirements = context.device.get_buffer_memory_requirements(handle);
+            let allocation = context
+                .allocator
+                .lock()
+                .map_err(|_| Error::Device("the allocator's lock is poisoned".to_owned()))?
+                .allocate(&AllocationCreateDesc {
+                    name,
+                    requirements,
+                    location,
+                    linear: true,
+                    allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+                })
+                .map_err(|error| {
+                    context.device.destroy_buffer(handle, None);
+                    Error::Device(format!(
+                        "no memory for {name} ({} MiB): {error}; try fewer --photons or a smaller --resolution",
+                        bytes >> 20
+                    ))
+                })?;
+            context
+                .device
+                .bind_buffer_memory(handle, allocation.memory(), allocation.offset())
+                .or_vulkan("vkBindBufferMemory")?;
+            context.name(handle, name);
+            Ok(Self { handle, bytes: bytes.max(4), allocation: Some(allocation) })
+        }
+    }
+
+    /// The memory of a host-visible buffer.
+    pub fn mapped(&mut self) -> &mut [u8] {
+        self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).unwrap_or_default()
+    }
+
+    /// Gives the buffer back. The device must not be using it.
+    pub fn free(mut self, context: &Context) {
+        // SAFETY: the caller has waited for the work that used it.
+        unsafe { context.device.destroy_buffer(self.handle, None) };
+        if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), context.allocator.lock()) {
+            // A failure here means that the allocation wasn't the allocator's, which it is.
+            let _ = allocator.free(allocation);
+        }
+    }
+}

@@ -1,0 +1,321 @@
+//! Loader, instance, physical and logical device, queue, allocator and the validation layer's messages.
+
+use std::ffi::{CStr, CString, c_void};
+use std::mem::ManuallyDrop;
+use std::sync::{Arc, Mutex};
+
+use ash::{ext, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+const API_VERSION: u32 = vk::API_VERSION_1_2;
+
+/// Turns a Vulkan result into the library's.
+pub(super) trait OrVulkan<T> {
+    fn or_vulkan(self, call: &'static str) -> Result<T>;
+}
+
+impl<T> OrVulkan<T> for std::result::Result<T, vk::Result> {
+    fn or_vulkan(self, call: &'static str) -> Result<T> {
+        self.map_err(|code| Error::Vulkan { call, code: format!("{code} ({code:?})") })
+    }
+}
+
+/// What a user may want to know of a Vulkan device.
+#[derive(Debug, Clone, Serialize)]
+pub struct DeviceSummary {
+    /// Index in the order that Vulkan lists devices.
+    pub index: usize,
+    /// Name.
+    pub name: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// `discrete`, `integrated`, `virtual`, `cpu` or `other`.
+    pub kind: &'static str,
+    /// Vulkan version.
+    pub api_version: String,
+    /// Nanoseconds of a timestamp tick.
+    pub timestamp_period_ns: f32,
+    /// Invocations of a subgroup.
+    pub subgroup_size: u32,
+    /// Bytes that one storage buffer binding can span.
+    pub max_storage_buffer_bytes: u64,
+    /// Bytes of shared memory of a workgroup.
+    pub max_shared_memory_bytes: u32,
+    /// What the device lacks to run the program; empty if nothing.
+    pub lacks: Vec<String>,
+}
+
+pub(super) type Messages = Arc<Mutex<Vec<String>>>;
+
+/// Loader and instance.
+pub(super) struct Instance {
+    pub entry: ash::Entry,
+    pub handle: ash::Instance,
+    debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    pub messages: Messages,
+}
+
+unsafe extern "system" fn on_message(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    messages: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the layer passes valid data, and `messages` outlives the messenger (see Instance).
+    unsafe {
+        let text = (*data).message_as_c_str().unwrap_or(c"(no text)").to_string_lossy().into_owned();
+        let messages = &*messages.cast::<Mutex<Vec<String>>>();
+        if let Ok(mut messages) = messages.lock() {
+            messages.push(text);
+        }
+    }
+    vk::FALSE
+}
+
+impl Instance {
+    /// Loads Vulkan. Debug builds turn on the validation layer where it is installed.
+    pub fn new() -> Result<Self> {
+        // SAFETY: the loader is the system's own.
+        let entry = unsafe { ash::Entry::load() }.map_err(|error| {
+            Error::Device(format!(
+                "no Vulkan loader: {error}; install one (Debian: libvulkan1 mesa-vulkan-drivers) or use --backend cpu"
+            ))
+        })?;
+        let messages = Messages::default();
+        // SAFETY: plain Vulkan calls on a live entry; pointers outlive the calls.
+        unsafe {
+            let layers = entry.enumerate_instance_layer_properties().or_vulkan("vkEnumerateInstanceLayerProperties")?;
+            let validate = cfg!(debug_assertions)
+                && layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
+            let extensions = entry
+                .enumerate_instance_extension_properties(None)
+                .or_vulkan("vkEnumerateInstanceExtensionProperties")?;
+            let debug_utils =
+                validate || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+            let application = vk::ApplicationInfo::default().application_name(c"ppm-vk").api_version(API_VERSION);
+            let layer_names = if validate { vec![VALIDATION_LAYER.as_ptr()] } else { Vec::new() };
+            let mut extension_names = Vec::new();
+            if debug_utils {
+                extension_names.push(ext::debug_utils::NAME.as_ptr());
+            }
+            let checks = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+            let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
+            if validate {
+                extension_names.push(ext::validation_features::NAME.as_ptr());
+            }
+            let mut create = vk::InstanceCreateInfo::default()
+                .application_info(&application)
+                .enabled_layer_names(&layer_names)
+                .enabled_extension_names(&extension_names);
+            if validate {
+                create = create.push_next(&mut features);
+            }
+            let handle = entry.create_instance(&create, None).map_err(|code| {
+                Error::Device(format!("no Vulkan instance: {code}; is a Vulkan driver installed? (or --backend cpu)"))
+            })?;
+            let debug = if validate {
+                let debug = ext::debug_utils::Instance::new(&entry, &handle);
+                let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                    .message_severity(
+                        vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                    )
+                    .message_type(
+                        vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
+                            | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
+                    )
+                    .pfn_user_callback(Some(on_message))
+                    .user_data(Arc::as_ptr(&messages).cast_mut().cast());
+                let messenger = debug
+                    .create_debug_utils_messenger(&info, None)
+                    .or_vulkan("vkCreateDebugUtilsMessengerEXT")?;
+                Some((debug, messenger))
+            } else {
+                None
+            };
+            Ok(Self { entry, handle, debug, messages })
+        }
+    }
+
+    /// Every device, usable or not.
+    pub fn devices(&self) -> Result<Vec<(vk::PhysicalDevice, DeviceSummary)>> {
+        // SAFETY: the instance is live.
+        let devices = unsafe { self.handle.enumerate_physical_devices() }.or_vulkan("vkEnumeratePhysicalDevices")?;
+        Ok(devices.into_iter().enumerate().map(|(index, device)| (device, self.summary(index, device))).collect())
+    }
+
+    fn summary(&self, index: usize, device: vk::PhysicalDevice) -> DeviceSummary {
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut properties =
+            vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut driver);
+        // SAFETY: the device belongs to this instance.
+        unsafe { self.handle.get_physical_device_properties2(device, &mut properties) };
+        let properties = properties.properties;
+        let limits = properties.limits;
+        let text = |chars: Option<&CStr>| chars.map_or_else(String::new, |c| c.to_string_lossy().into_owned());
+        let mut lacks = Vec::new();
+        if properties.api_version < API_VERSION {
+            lacks.push("Vulkan 1.2".to_owned());
+        }
+        match self.compute_family(device) {
+            None => lacks.push("a compute queue".to_owned()),
+            Some((_, 0)) => lacks.push("timestamps on its compute queue".to_owned()),
+            Some(_) => {}
+        }
+        if limits.max_compute_shared_memory_size < 16384 {
+            lacks.push("16 KiB of shared memory".to_owned());
+        }
+        let version = |v: u32| {
+            format!(
+                "{}.{}.{}",
+                vk::api_version_major(v),
+                vk::api_version_minor(v),
+                vk::api_version_patch(v)
+            )
+        };
+        DeviceSummary {
+            index,
+            name: text(properties.device_name_as_c_str().ok()),
+            driver: format!(
+                "{} {}",
+                text(driver.driver_name_as_c_str().ok()),
+                text(driver.driver_info_as_c_str().ok())
+            )
+            .trim()
+            .to_owned(),
+            kind: match properties.device_type {
+                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+                vk::PhysicalDeviceType::CPU => "cpu",
+                _ => "other",
+            },
+            api_version: version(properties.api_version),
+            timestamp_period_ns: limits.timestamp_period,
+            subgroup_size: subgroup.subgroup_size,
+            max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+            max_shared_memory_bytes: limits.max_compute_shared_memory_size,
+            lacks,
+        }
+    }
+
+    /// A queue family that computes, and its timestamps' valid bits; one without graphics where there is a choice.
+    pub fn compute_family(&self, device: vk::PhysicalDevice) -> Option<(u32, u32)> {
+        // SAFETY: the device belongs to this instance.
+        let families = unsafe { self.handle.get_physical_device_queue_family_properties(device) };
+        let computes = families.iter().enumerate().filter(|(_, f)| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
+        computes
+            .min_by_key(|(_, f)| (f.timestamp_valid_bits == 0, f.queue_flags.contains(vk::QueueFlags::GRAPHICS)))
+            .map(|(index, family)| (index as u32, family.timestamp_valid_bits))
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: everything made from the instance is gone: Context, its only user, drops it last.
+        unsafe {
+            if let Some((debug, messenger)) = &self.debug {
+                debug.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.handle.destroy_instance(None);
+        }
+    }
+}
+
+/// A logical device with its queue and its allocator.
+pub(super) struct Context {
+    // Dropped first: it frees memory of the device.
+    pub allocator: ManuallyDrop<Mutex<Allocator>>,
+    pub device: ash::Device,
+    pub queue: vk::Queue,
+    pub family: u32,
+    pub timestamp_bits: u32,
+    debug: Option<ext::debug_utils::Device>,
+    pub instance: Instance,
+}
+
+impl Context {
+    pub fn new(instance: Instance, physical: vk::PhysicalDevice) -> Result<Self> {
+        let (family, timestamp_bits) = instance
+            .compute_family(physical)
+            .ok_or_else(|| Error::Device("the device has no compute queue".to_owned()))?;
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
+        let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+        // SAFETY: the physical device belongs to the instance, which the context keeps alive.
+        unsafe {
+            let device = instance.handle.create_device(physical, &create, None).or_vulkan("vkCreateDevice")?;
+            let queue = device.get_device_queue(family, 0);
+            let debug = instance.debug.is_some().then(|| ext::debug_utils::Device::new(&instance.handle, &device));
+            let allocator = Allocator::new(&AllocatorCreateDesc {
+                instance: instance.handle.clone(),
+                device: device.clone(),
+                physical_device: physical,
+                debug_settings: AllocatorDebugSettings::default(),
+                buffer_device_address: false,
+                allocation_sizes: AllocationSizes::default(),
+            })
+            .map_err(|error| Error::Device(format!("no allocator: {error}")))?;
+            Ok(Self {
+                allocator: ManuallyDrop::new(Mutex::new(allocator)),
+                device,
+                queue,
+                family,
+                timestamp_bits,
+                debug,
+                instance,
+            })
+        }
+    }
+
+    /// Names an object for debuggers and the validation layer.
+    pub fn name<H: vk::Handle>(&self, handle: H, name: &str) {
+        if let (Some(debug), Ok(name)) = (&self.debug, CString::new(name)) {
+            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+            // SAFETY: the handle is alive: its creator calls this. A failure costs the name alone.
+            let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+        }
+    }
+
+    /// Opens a labelled region in a command buffer.
+    pub fn begin_label(&self, commands: vk::CommandBuffer, name: &str) {
+        if let (Some(debug), Ok(name)) = (&self.debug, CString::new(name)) {
+            let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
+            // SAFETY: the command buffer is recording.
+            unsafe { debug.cmd_begin_debug_utils_label(commands, &label) };
+        }
+    }
+
+    /// Closes it.
+    pub fn end_label(&self, commands: vk::CommandBuffer) {
+        if let Some(debug) = &self.debug {
+            // SAFETY: as above.
+            unsafe { debug.cmd_end_debug_utils_label(commands) };
+        }
+    }
+
+    /// What the validation layer said since the last call.
+    pub fn take_messages(&self) -> Vec<String> {
+        self.instance.messages.lock().map(|mut messages| std::mem::take(&mut *messages)).unwrap_or_default()
+    }
+}
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        // SAFETY: buffers, pipelines and pools are gone: Device drops them before the context.
+        unsafe {
+            let _ = self.device.device_wait_idle();
+            ManuallyDrop::drop(&mut self.allocator);
+            self.device.destroy_device(None);
+        }
+        let messages = self.take_messages();
+        if !messages.is_empty() && !std::thread::panicking() {
+            panic!("validation at teardown: {}", messages.join("\n"));
+        }
+    }
+}

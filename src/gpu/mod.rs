@@ -1,0 +1,14 @@
+//! The Vulkan host: the only place that uses ash, and the only one with `unsafe`.
+//!
+//! [`Device`] owns the device's buffers by [`crate::stage::BufferId`] and runs [`crate::record::Recording`]s on them.
+
+mod buffer;
+mod context;
+mod device;
+mod execute;
+mod pipeline;
+mod self_check;
+
+pub use context::DeviceSummary;
+pub use device::{Device, devices};
+pub use execute::{Launch, Run};

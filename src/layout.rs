@@ -1,0 +1,240 @@
+//! Every struct that host and device share. `tests/layout.rs` compares each with the reflected GLSL struct of its name.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Object of a visible point whose path met no matte surface.
+pub const NO_OBJECT: u32 = u32::MAX;
+
+/// A field's name, offset and size in bytes.
+pub type FieldLayout = (&'static str, usize, usize);
+
+/// Declares structs of the device's layout and [`LAYOUTS`], which lists their fields.
+macro_rules! device_structs {
+    ($($(#[$doc:meta])* pub struct $name:ident: $size:literal {
+        $($(#[$field_doc:meta])* pub $field:ident: $type:ty,)*
+    })*) => {
+        $(
+            $(#[$doc])*
+            #[repr(C)]
+            #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+            pub struct $name {
+                $($(#[$field_doc])* pub $field: $type,)*
+            }
+            const _: () = assert!(size_of::<$name>() == $size);
+        )*
+        /// Name and fields of every struct of this module.
+        pub const LAYOUTS: &[(&str, &[FieldLayout])] = &[
+            $((stringify!($name), &[
+                $((stringify!($field), std::mem::offset_of!($name, $field), size_of::<$type>()),)*
+            ]),)*
+        ];
+    };
+}
+
+device_structs! {
+    /// What stays the same through a render. Lengths in render units.
+    pub struct Settings: 128 {
+        /// xyz: centre of projection.
+        pub camera_position: [f32; 4],
+        /// xyz: to the picture's right edge, at distance 1.
+        pub camera_right: [f32; 4],
+        /// xyz: to the picture's top edge, at distance 1.
+        pub camera_up: [f32; 4],
+        /// xyz: unit vector into the picture.
+        pub camera_forward: [f32; 4],
+        /// Pixels, width and height.
+        pub resolution: [u32; 2],
+        /// Visible points a pixel.
+        pub slots_per_pixel: u32,
+        /// The user's seed.
+        pub seed: u32,
+        /// Emissive triangles.
+        pub light_count: u32,
+        /// Σ mean(Le) · π · area · sides over the lights.
+        pub light_flux: f32,
+        /// Bounces of a path at the most.
+        pub max_depth: u32,
+        /// Triangles.
+        pub triangle_count: u32,
+        /// Invocations of the photon stage.
+        pub photon_lanes: u32,
+        /// Photons that each of them can store.
+        pub lane_capacity: u32,
+        /// Photons that a batch can store.
+        pub photon_capacity: u32,
+        /// log2 of the grid's buckets.
+        pub cell_bits: u32,
+        /// Eq. 2's α.
+        pub alpha: f32,
+        /// R² before the first photon.
+        pub initial_radius2: f32,
+        /// Iterations that all loops of one invocation may make together.
+        pub loop_limit: u32,
+        /// Zero.
+        pub scan_padding: u32,
+    }
+
+    /// An inner node of the BVH with the boxes of both children.
+    pub struct BvhNode: 64 {
+        /// xyz: corner; w: u32 bits, the child's node, or its first triangle.
+        pub left_min: [f32; 4],
+        /// xyz: corner; w: u32 bits, triangles of a leaf, 0 for an inner node.
+        pub left_max: [f32; 4],
+        /// As `left_min`.
+        pub right_min: [f32; 4],
+        /// As `left_max`.
+        pub right_max: [f32; 4],
+    }
+
+    /// Havel and Herout's precomputed triangle.
+    pub struct HavelTriangle: 48 {
+        /// xyz: normal (not unit); w: its plane's offset.
+        pub n0: [f32; 4],
+        /// xyz, w: plane whose value is the barycentric coordinate u.
+        pub n1: [f32; 4],
+        /// xyz, w: plane whose value is the barycentric coordinate v.
+        pub n2: [f32; 4],
+    }
+
+    /// A triangle as shading needs it.
+    pub struct ShadingTriangle: 64 {
+        /// xyz: position; w: u32 bits, octahedral shading normal.
+        pub p0: [f32; 4],
+        /// Likewise.
+        pub p1: [f32; 4],
+        /// Likewise.
+        pub p2: [f32; 4],
+        /// Index of its object.
+        pub object: u32,
+        /// Index of its material.
+        pub material: u32,
+        /// 1 where the shading normals differ from the geometric one.
+        pub smooth_shaded: u32,
+        /// Zero.
+        pub padding: u32,
+    }
+
+    /// A material.
+    pub struct Material: 48 {
+        /// Linear RGB albedo, reflectance or tint.
+        pub base_color: [f32; 3],
+        /// 0 matte, 1 mirror, 2 dielectric.
+        pub surface: u32,
+        /// Emitted radiance, linear RGB.
+        pub emission: [f32; 3],
+        /// Index of refraction inside.
+        pub ior: f32,
+        /// 1 where the back emits as well.
+        pub double_sided: u32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+        /// Zero.
+        pub padding2: u32,
+    }
+
+    /// An emissive triangle.
+    pub struct Light: 16 {
+        /// Index of the triangle.
+        pub triangle: u32,
+        /// Probability of this light and those before it.
+        pub cumulative: f32,
+        /// Its probability, in proportion to its flux.
+        pub probability: f32,
+        /// Area.
+        pub area: f32,
+    }
+
+    /// The paper's hitpoint.
+    pub struct VisiblePoint: 48 {
+        /// xyz: position; w: u32 bits, object or [`NO_OBJECT`].
+        pub position_object: [f32; 4],
+        /// rgb: throughput × BRDF, 1/sr; w: u32 bits, octahedral geometric normal on the viewer's side.
+        pub weight_normal: [f32; 4],
+        /// rgb: radiance that the path saw by itself; w: u32 bits, octahedral shading normal on the viewer's side.
+        pub emitted_normal: [f32; 4],
+    }
+
+    /// A photon.
+    pub struct Photon: 32 {
+        /// xyz: position; w: u32 bits, object.
+        pub position_object: [f32; 4],
+        /// rgb: flux, not divided by the emitted paths; w: u32 bits, octahedral direction of flight.
+        pub flux_direction: [f32; 4],
+    }
+
+    /// R², N and τ of a visible point.
+    pub struct Statistics: 48 {
+        /// R², leading f32.
+        pub radius2_high: f32,
+        /// R², rest.
+        pub radius2_low: f32,
+        /// Photons accepted so far, low word; eq. 2's N is α times the whole.
+        pub accepted_low: u32,
+        /// High word.
+        pub accepted_high: u32,
+        /// rgb: τ, leading f32s.
+        pub flux_high: [f32; 4],
+        /// rgb: τ, rest.
+        pub flux_low: [f32; 4],
+    }
+
+    /// An iteration's photons of a visible point.
+    pub struct Gathered: 16 {
+        /// rgb: Σ flux; w: u32 bits, M.
+        pub flux_count: [f32; 4],
+    }
+
+    /// Radiance seen directly, summed over the iterations.
+    pub struct DirectSum: 32 {
+        /// rgb: leading f32s.
+        pub high: [f32; 4],
+        /// rgb: rest.
+        pub low: [f32; 4],
+    }
+
+    /// The radii of a workgroup's visible points.
+    pub struct RadiusSum: 16 {
+        /// Σ R.
+        pub radius: f32,
+        /// The largest R².
+        pub radius2: f32,
+        /// Visible points.
+        pub count: u32,
+        /// Zero.
+        pub padding: u32,
+    }
+
+    /// The hashed grid of an iteration.
+    pub struct GridShape: 16 {
+        /// 1 / cell size.
+        pub inverse_cell_size: f32,
+        /// Edge of a cell.
+        pub cell_size: f32,
+        /// Mean radius of the visible points.
+        pub mean_radius: f32,
+        /// The largest R².
+        pub largest_radius2: f32,
+    }
+
+    /// What the stages report to the host.
+    pub struct StatusCounters: 32 {
+        /// Photons that wanted to be stored, of the batch with the most.
+        pub photons_in_batch: u32,
+        /// Most photons that one lane had to store.
+        pub lane_need: u32,
+        /// Paths ended by the bounce limit.
+        pub truncated_paths: u32,
+        /// Paths ended by the driver's loop limit.
+        pub cut_paths: u32,
+        /// Values that were NaN or infinite and were left out.
+        pub non_finite: u32,
+        /// 1: photons didn't fit; the iteration has to be done again.
+        pub overflow: u32,
+        /// Photons stored, low word.
+        pub photons_stored_low: u32,
+        /// High word.
+        pub photons_stored_high: u32,
+    }
+}

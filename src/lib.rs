@@ -1,0 +1,13 @@
+pub mod config;
+pub mod error;
+pub mod film;
+pub mod gather;
+pub mod gpu;
+pub mod layout;
+pub mod metrics;
+pub mod pipeline;
+pub mod radius;
+pub mod record;
+pub mod scene;
+pub mod shaders;
+pub mod stage;

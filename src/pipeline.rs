@@ -1,0 +1,307 @@
+//! The order of the stages in one iteration, on a Vulkan device. [`Renderer::record_iteration`] reads like figure 1 of
+//! the paper.
+
+use crate::config::{Accel, DeviceLimits, Direct, Estimator, RenderConfig, Sizes};
+use crate::error::{Error, Result};
+use crate::film::Image;
+use crate::gather::{METHODS, scan};
+use crate::gpu::{Device, Run};
+use crate::layout::{Photon, Settings, StatusCounters, VisiblePoint};
+use crate::record::Recording;
+use crate::scene::{Camera, PackedScene};
+use crate::stage::{BufferId, StageDesc};
+use crate::{radius, shaders};
+
+/// A progressive render on a device.
+pub struct Renderer {
+    device: Device,
+    config: RenderConfig,
+    sizes: Sizes,
+    settings: Settings,
+    iterations: u32,
+    emitted: u64,
+    counters: Counters,
+}
+
+/// What happened in a render besides its picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Photons stored in all iterations.
+    pub photons_stored: u64,
+    /// Paths that the bounce limit ended.
+    pub truncated_paths: u64,
+    /// Paths that the driver's loop limit ended.
+    pub cut_paths: u64,
+    /// Values that were NaN or infinite and were left out.
+    pub non_finite: u64,
+    /// Iterations done again because photons didn't fit.
+    pub repeated_iterations: u64,
+}
+
+/// Loop iterations that photon paths of a lane may make together where the driver has a limit: a subgroup's lanes share
+/// it on the driver that has one, and an inner loop runs as long as its slowest lane.
+fn loop_budget(limit: u32) -> u32 {
+    if limit == u32::MAX { limit } else { limit / 4 }
+}
+
+impl Renderer {
+    /// Prepares a render: uploads the scene, finds the radius, resets the statistics.
+    ///
+    /// # Errors
+    /// A setting outside its range, a device without enough memory, or a failed Vulkan call.
+    pub fn new(mut device: Device, scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
+        config.check()?;
+        let limits = DeviceLimits {
+            storage_buffer_bytes: device.summary().max_storage_buffer_bytes,
+            loop_limit: loop_budget(device.loop_limit()),
+            lanes: if device.summary().kind == "cpu" { 4096 } else { 1 << 18 },
+        };
+        let sizes = Sizes::new(&config, limits);
+        device.upload(BufferId::Bvh, &scene.bvh)?;
+        device.upload(BufferId::HavelTriangles, &scene.havel_triangles)?;
+        device.upload(BufferId::ShadingTriangles, &scene.shading_triangles)?;
+        device.upload(BufferId::Materials, &scene.materials)?;
+        device.upload(BufferId::Lights, &scene.lights)?;
+        let settings = settings(&config, scene, camera, limits.loop_limit);
+        let mut renderer =
+            Self { device, config, sizes, settings, iterations: 0, emitted: 0, counters: Counters::default() };
+        renderer.create_picture_buffers()?;
+        renderer.create_photon_buffers()?;
+        renderer.choose_radius()?;
+        renderer.reset()?;
+        Ok(renderer)
+    }
+
+    /// Does one iteration; returns what its stages took.
+    ///
+    /// # Errors
+    /// A failed Vulkan call, or no memory for the photons.
+    pub fn iterate(&mut self) -> Result<Run> {
+        let recording = self.record_iteration(self.iterations);
+        let run = self.run_until_it_fits(&recording)?;
+        self.iterations += 1;
+        self.emitted += u64::from(self.config.photons);
+        Ok(run)
+    }
+
+    /// The commands of an iteration.
+    fn record_iteration(&self, iteration: u32) -> Recording {
+        let mut recording = Recording::new();
+        if iteration == 0 || self.config.estimator == Estimator::Sppm {
+            recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(iteration));
+        }
+        for batch in 0..self.sizes.batches(self.config.photons) {
+            self.record_photons(iteration, batch, &mut recording);
+            (METHODS[self.config.gather].record)(&self.sizes, &mut recording);
+        }
+        recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(iteration));
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.slots()));
+        recording
+    }
+
+    /// Photon tracing of a batch, and moving its photons together.
+    fn record_photons(&self, iteration: u32, batch: u32, recording: &mut Recording) {
+        let first = batch * self.sizes.batch_paths;
+        let paths = self.sizes.batch_paths.min(self.config.photons - first);
+        let lanes = self.sizes.photon_lanes;
+        recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([iteration, first, paths]));
+        scan(BufferId::LaneOffsets, lanes, recording);
+        recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.photon_capacity()));
+    }
+
+    fn ray_stage(&self, shader: &'static crate::stage::Shader, threads: u32) -> StageDesc {
+        StageDesc::new(shader, threads).constants(vec![
+            ("BRUTE_FORCE", u32::from(self.config.accel == Accel::Brute)),
+            ("SLOTS", self.sizes.slots_per_pixel),
+            ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
+            ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),
+        ])
+    }
+
+    /// Runs an iteration; where photons don't fit or loops are cut, makes room and does it again.
+    fn run_until_it_fits(&mut self, recording: &Recording) -> Result<Run> {
+        let mut run = self.device.run(recording)?;
+        loop {
+            let status = self.take_status()?;
+            let cut = status.cut_paths > 0 && self.sizes.paths_per_lane() > 1;
+            if status.overflow == 0 && !cut {
+                self.counters.photons_stored +=
+                    u64::from(status.photons_stored_low) | u64::from(status.photons_stored_high) << 32;
+                self.counters.truncated_paths += u64::from(status.truncated_paths);
+                self.counters.cut_paths += u64::from(status.cut_paths);
+                self.counters.non_finite += u64::from(status.non_finite);
+                return Ok(run);
+            }
+            self.counters.repeated_iterations += 1;
+            if cut {
+                self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
+            }
+            if status.overflow != 0 {
+                self.sizes.lane_capacity = self.sizes.lane_capacity.max(status.lane_need + status.lane_need / 4 + 1);
+            }
+            self.create_photon_buffers()?;
+            let mut again = Recording::new();
+            again.fill(BufferId::GatheredOf, 0);
+            self.device.run(&again)?;
+            run = self.device.run(&self.record_iteration(self.iterations))?;
+        }
+    }
+
+    fn take_status(&mut self) -> Result<StatusCounters> {
+        let status: Vec<StatusCounters> = self.device.download(BufferId::Status, Some(1))?;
+        let mut recording = Recording::new();
+        recording.fill(BufferId::Status, 0);
+        self.device.run(&recording)?;
+        status.first().copied().ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
+    }
+
+    /// The picture so far (eq. 4).
+    ///
+    /// # Errors
+    /// A failed Vulkan call.
+    pub fn resolve(&mut self) -> Result<Image> {
+        let mut recording = Recording::new();
+        let push = [self.iterations.max(1), (self.emitted.max(1) as f32).to_bits()];
+        recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
+        self.device.run(&recording)?;
+        let [width, height] = self.config.resolution.map(|side| side as usize);
+        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
+        let pixels = film.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+        Ok(Image::new(width, height, pixels))
+    }
+
+    /// Iterations done.
+    pub fn iterations(&self) -> u32 {
+        self.iterations
+    }
+
+    /// Photon paths emitted.
+    pub fn emitted(&self) -> u64 {
+        self.emitted
+    }
+
+    /// What happened besides the picture.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// The initial radius, render units.
+    pub fn radius(&self) -> f32 {
+        self.settings.initial_radius2.sqrt()
+    }
+
+    /// The device, to read its buffers.
+    pub fn device(&mut self) -> &mut Device {
+        &mut self.device
+    }
+
+    fn create_picture_buffers(&mut self) -> Result<()> {
+        use crate::layout::{DirectSum, Gathered, RadiusSum, Statistics};
+        let slots = u64::from(self.sizes.slots());
+        let pixels = u64::from(self.config.resolution[0]) * u64::from(self.config.resolution[1]);
+        let groups = slots.div_ceil(u64::from(shaders::UPDATE.workgroup));
+        for (id, count, size) in [
+            (BufferId::VisiblePoints, slots, size_of::<VisiblePoint>()),
+            (BufferId::StatisticsOf, slots, size_of::<Statistics>()),
+            (BufferId::GatheredOf, slots, size_of::<Gathered>()),
+            (BufferId::DirectSums, slots, size_of::<DirectSum>()),
+            (BufferId::RadiusSums, groups, size_of::<RadiusSum>()),
+            (BufferId::Film, pixels, 16),
+            (BufferId::Status, 1, size_of::<StatusCounters>()),
+            (BufferId::Grid, 1, size_of::<crate::layout::GridShape>()),
+            (BufferId::PhotonCount, 1, 4),
+            (BufferId::ScanTotal, 1, 4),
+        ] {
+            self.device.create(id, count * size as u64)?;
+        }
+        Ok(())
+    }
+
+    fn create_photon_buffers(&mut self) -> Result<()> {
+        let sizes = &self.sizes;
+        let photons = u64::from(sizes.photon_lanes) * u64::from(sizes.lane_capacity);
+        let lanes = u64::from(sizes.photon_lanes);
+        let cells = 1u64 << sizes.cell_bits;
+        let histograms = photons.div_ceil(u64::from(crate::config::SORT_TILE)) << crate::config::SORT_DIGIT_BITS;
+        let scanned = histograms.max(lanes);
+        let scan_sums = scanned.div_ceil(u64::from(crate::config::SCAN_BLOCK));
+        for (id, count, size) in [
+            (BufferId::LanePhotons, photons, size_of::<Photon>()),
+            (BufferId::Photons, photons, size_of::<Photon>()),
+            (BufferId::SortedPhotons, photons, size_of::<Photon>()),
+            (BufferId::LaneCounts, lanes, 4),
+            (BufferId::LaneOffsets, lanes, 4),
+            (BufferId::Keys, photons, 4),
+            (BufferId::Values, photons, 4),
+            (BufferId::OtherKeys, photons, 4),
+            (BufferId::OtherValues, photons, 4),
+            (BufferId::Histograms, histograms, 4),
+            (BufferId::ScanSums, scan_sums, 4),
+            (BufferId::CellStarts, cells, 4),
+            (BufferId::CellEnds, cells, 4),
+        ] {
+            self.device.create(id, count * size as u64)?;
+        }
+        self.settings.photon_lanes = sizes.photon_lanes;
+        self.settings.lane_capacity = sizes.lane_capacity;
+        self.settings.photon_capacity = sizes.photon_capacity();
+        self.settings.cell_bits = sizes.cell_bits;
+        self.settings.slots_per_pixel = sizes.slots_per_pixel;
+        self.device.upload(BufferId::Settings, &[self.settings])
+    }
+
+    /// Takes the user's radius, or finds one from the density of a first batch of photons.
+    fn choose_radius(&mut self) -> Result<()> {
+        if self.settings.initial_radius2 == 0.0 {
+            let mut recording = Recording::new();
+            recording.fill(BufferId::Status, 0);
+            recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(0u32));
+            self.record_photons(0, 0, &mut recording);
+            self.device.run(&recording)?;
+            let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
+            let count: Vec<u32> = self.device.download(BufferId::PhotonCount, Some(1))?;
+            let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
+            let radius = radius::automatic(&visible_points, &photons);
+            // A batch is a part of the iteration's photons; the density is that of the whole.
+            let share = f64::from(self.sizes.batch_paths) / f64::from(self.config.photons);
+            self.settings.initial_radius2 = (radius * radius * share) as f32;
+        }
+        self.device.upload(BufferId::Settings, &[self.settings])
+    }
+
+    fn reset(&mut self) -> Result<()> {
+        let mut recording = Recording::new();
+        recording.fill(BufferId::Status, 0);
+        recording.fill(BufferId::DirectSums, 0);
+        recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.slots()));
+        self.device.run(&recording).map(|_| ())
+    }
+}
+
+fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loop_limit: u32) -> Settings {
+    let [width, height] = config.resolution;
+    let half_height = camera.tan_half_fov;
+    let half_width = half_height * width as f32 / height as f32;
+    let with_zero = |v: glam::Vec3| [v.x, v.y, v.z, 0.0];
+    Settings {
+        camera_position: with_zero(camera.position),
+        camera_right: with_zero(camera.right * half_width),
+        camera_up: with_zero(camera.up * half_height),
+        camera_forward: with_zero(camera.forward),
+        resolution: config.resolution,
+        slots_per_pixel: 1,
+        seed: config.seed,
+        light_count: scene.lights.len() as u32,
+        light_flux: scene.light_flux as f32,
+        max_depth: config.max_depth,
+        triangle_count: scene.shading_triangles.len() as u32,
+        photon_lanes: 0,
+        lane_capacity: 0,
+        photon_capacity: 0,
+        cell_bits: 0,
+        alpha: config.alpha,
+        initial_radius2: config.radius.map_or(0.0, |radius| (radius * scene.scale).powi(2) as f32),
+        loop_limit,
+        scan_padding: 0,
+    }
+}

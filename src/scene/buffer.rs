@@ -1,0 +1,155 @@
+//! Reads the buffers that a glTF file refers to: the `.glb` binary chunk, data URIs and files beside it.
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+use base64::Engine;
+use base64::engine::DecodePaddingMode;
+use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
+use gltf::json::{Buffer, Root};
+
+use super::diagnostic::{Check, damaged, label, quote};
+
+/// Base64 that may lack its padding, which some exporters leave out.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &base64::alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
+
+/// The most that all buffers of a scene may hold, in bytes: a small file can name a large one a thousand times.
+const MAX_TOTAL_SIZE: u64 = 1 << 33;
+
+/// Reads each buffer of `root`. `folder` holds the scene file, `binary` is the binary chunk of a `.glb`.
+pub(super) fn read_all(root: &Root, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<Vec<u8>>> {
+    let total = root
+        .buffers
+        .iter()
+        .fold(0u64, |total, buffer| total.saturating_add(buffer.byte_length.0));
+    if total > MAX_TOTAL_SIZE {
+        return Err(format!(
+            "its buffers have {total} bytes, more than the {MAX_TOTAL_SIZE} that are read; split the scene"
+        ));
+    }
+    let mut binary = binary;
+    let mut buffers = Vec::with_capacity(root.buffers.len());
+    for (index, buffer) in root.buffers.iter().enumerate() {
+        // Only the first buffer may lack a URI, and then it is the binary chunk.
+        let binary = binary.take();
+        let bytes = read(buffer, folder, binary)
+            .map_err(|what| format!("{}: {what}", label("buffer", index, buffer.name.as_deref())))?;
+        buffers.push(bytes);
+    }
+    Ok(buffers)
+}
+
+fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8>> {
+    let length = buffer.byte_length.0;
+    let (bytes, source) = match &buffer.uri {
+        None => (
+            binary.ok_or_else(|| damaged("it has no uri, and the file no binary chunk for it"))?,
+            "the binary chunk".to_owned(),
+        ),
+        Some(uri) => match uri.strip_prefix("data:") {
+            Some(data) => (decode_data_uri(data)?, "its data URI".to_owned()),
+            None => {
+                let path = folder.join(relative_path(uri)?);
+                (read_file(&path, length)?, quote(uri))
+            }
+        },
+    };
+    if (bytes.len() as u64) < length {
+        return Err(damaged(format_args!(
+            "its byteLength is {length}, but {source} has {} bytes",
+            bytes.len()
+        )));
+    }
+    Ok(bytes)
+}
+
+/// Reads the first `length` bytes of a file, or all where it is shorter.
+fn read_file(path: &Path, length: u64) -> Check<Vec<u8>> {
+    let place = quote(&path.to_string_lossy());
+    let unreadable = |error| format!("{place} can't be read ({error}); put the buffer's file there");
+    // Opening a pipe would wait for a writer, and a device may have no end: ask before.
+    let metadata = fs::metadata(path).map_err(unreadable)?;
+    if !metadata.is_file() {
+        return Err(format!("{place} isn't a file; put the buffer's file there"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(length).read_to_end(&mut bytes))
+        .map_err(unreadable)?;
+    Ok(bytes)
+}
+
+/// Decodes `[media type];base64,…`, what follows `data:`. Media types are not told apart.
+fn decode_data_uri(data: &str) -> Check<Vec<u8>> {
+    let (head, body) = data
+        .split_once(',')
+        .ok_or_else(|| damaged("its data URI has no comma before the data"))?;
+    if !head.ends_with(";base64") {
+        return Err("its data URI isn't base64; export it with base64 or external buffers".into());
+    }
+    BASE64
+        .decode(body)
+        .map_err(|error| damaged(format_args!("its data URI isn't valid base64 ({error})")))
+}
+
+/// The path that a relative URI names, checked to stay in the scene file's folder or below.
+fn relative_path(uri: &str) -> Check<PathBuf> {
+    let advice = "put the buffer's file beside the scene and refer to it by a relative path";
+    if let Some((scheme, _)) = uri.split_once(':')
+        && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+        && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+    {
+        return Err(format!(
+            "its uri {} has the scheme {}, which isn't followed; {advice}",
+            quote(uri),
+            quote(scheme)
+        ));
+    }
+    let decoded = percent_decode(uri)
+        .filter(|decoded| !decoded.contains('\0'))
+        .ok_or_else(|| damaged(format_args!("its uri {} isn't a valid file name", quote(uri))))?;
+    let path = PathBuf::from(decoded);
+    let is_inside = path
+        .components()
+        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if !is_inside {
+        return Err(format!(
+            "its uri {} leads out of the scene's folder; {advice}",
+            quote(uri)
+        ));
+    }
+    Ok(path)
+}
+
+/// Replaces `%2F` and the like; a `%` without two digits stands for itself. `None` if the result isn't UTF-8.
+fn percent_decode(uri: &str) -> Option<String> {
+    let mut decoded = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let [first, tail @ ..] = rest {
+        match (first, tail) {
+            (b'%', [high, low, after @ ..]) if high.is_ascii_hexdigit() && low.is_ascii_hexdigit() => {
+                decoded.push(hex_value(*high) << 4 | hex_value(*low));
+                rest = after;
+            }
+            _ => {
+                decoded.push(*first);
+                rest = tail;
+            }
+        }
+    }
+    String::from_utf8(decoded).ok()
+}
+
+/// Value of a hexadecimal digit.
+fn hex_value(digit: u8) -> u8 {
+    match digit {
+        b'0'..=b'9' => digit - b'0',
+        _ => (digit | 0x20) - b'a' + 10,
+    }
+}

@@ -1,0 +1,131 @@
+//! Reads a `.gltf` or `.glb` file and its buffers, without looking at what they describe.
+//!
+//! The `gltf` crate's own reader is not used beyond its JSON types: its validation indexes accessors unchecked, takes
+//! `KHR_materials_volume` for unsupported, and rejects the custom attributes that the format allows.
+
+use std::fs;
+use std::path::Path;
+
+use gltf::json::Root;
+use serde::Deserialize;
+
+use super::buffer;
+use super::diagnostic::{Check, damaged, quote};
+use super::glb;
+
+/// The extensions that a file may list as required. Each is a feature of the `gltf` crate that `Cargo.toml` turns on.
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 5] = [
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+];
+
+/// The largest file that is read, in bytes: what a `.glb` header can express.
+const MAX_FILE_SIZE: u64 = u32::MAX as u64;
+
+/// The file's JSON and the bytes of its buffers. Indices in the JSON are unchecked.
+pub(super) struct Document {
+    /// The JSON.
+    pub root: Root,
+    /// One byte string per `root.buffers`, at least as long as its `byteLength`.
+    pub buffers: Vec<Vec<u8>>,
+}
+
+/// What must be known before the rest is parsed: another version or extension may have another structure.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Preamble {
+    asset: Option<Asset>,
+    #[serde(default)]
+    extensions_required: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Asset {
+    version: String,
+    min_version: Option<String>,
+}
+
+impl Document {
+    /// Reads the file at `path` and all buffers that it refers to.
+    pub(super) fn read(path: &Path) -> Check<Self> {
+        let mut bytes = read_file(path)?;
+        let (json, binary) = if bytes.starts_with(glb::MAGIC) {
+            glb::split(&bytes)?
+        } else {
+            (0..bytes.len(), None)
+        };
+        let root = parse(&bytes[json])?;
+        // The binary chunk can be most of the file: shrink to it instead of copying.
+        let binary = binary.map(|chunk| {
+            bytes.truncate(chunk.end);
+            bytes.drain(..chunk.start);
+            bytes
+        });
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let buffers = buffer::read_all(&root, folder, binary)?;
+        Ok(Self { root, buffers })
+    }
+}
+
+fn read_file(path: &Path) -> Check<Vec<u8>> {
+    let unreadable = |error| format!("can't be read ({error}); check the path and its permissions");
+    let metadata = fs::metadata(path).map_err(unreadable)?;
+    if !metadata.is_file() {
+        return Err("isn't a file; give the path of a .gltf or .glb file".into());
+    }
+    if metadata.len() > MAX_FILE_SIZE {
+        return Err(format!(
+            "has {} bytes, more than the {MAX_FILE_SIZE} that a glTF file is read up to; split the scene",
+            metadata.len()
+        ));
+    }
+    let bytes = fs::read(path).map_err(unreadable)?;
+    if bytes.is_empty() {
+        return Err("is empty; export the scene again".into());
+    }
+    Ok(bytes)
+}
+
+fn parse(json: &[u8]) -> Check<Root> {
+    // The specification forbids a byte order mark; some editors add one all the same.
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    let preamble: Preamble = serde_json::from_slice(json).map_err(json_error)?;
+    check_version(preamble.asset.as_ref())?;
+    for extension in &preamble.extensions_required {
+        if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) {
+            return Err(format!(
+                "requires the extension {}, which isn't supported; export the scene without it",
+                quote(extension)
+            ));
+        }
+    }
+    serde_json::from_slice(json).map_err(json_error)
+}
+
+fn json_error(error: serde_json::Error) -> String {
+    if error.is_data() {
+        damaged(format_args!("isn't glTF 2.0 ({error})"))
+    } else {
+        format!("isn't glTF: neither .glb nor JSON ({error}); give a .gltf or .glb file, or export it again")
+    }
+}
+
+fn check_version(asset: Option<&Asset>) -> Check<()> {
+    let Some(asset) = asset else {
+        return Err(damaged("has no asset.version, so it isn't glTF 2.0"));
+    };
+    let is_2 = asset.version == "2" || asset.version.starts_with("2.");
+    let is_readable = asset.min_version.as_deref().is_none_or(|version| version == "2.0");
+    if is_2 && is_readable {
+        return Ok(());
+    }
+    let version = asset.min_version.as_ref().unwrap_or(&asset.version);
+    Err(format!(
+        "is glTF {}, but only 2.0 is supported; export it as glTF 2.0",
+        quote(version)
+    ))
+}

@@ -1,0 +1,102 @@
+//! From a glTF file to a [`Scene`].
+
+use std::path::Path;
+
+use super::diagnostic::{Check, Warnings, quote};
+use super::document::{Document, SUPPORTED_EXTENSIONS};
+use super::graph::{PlacedNode, place_nodes};
+use super::{Scene, camera, geometry, material};
+use crate::error::{Error, Result};
+
+/// Not supported yet, but named in a warning of its own.
+const LIGHTS_EXTENSION: &str = "KHR_lights_punctual";
+
+impl Scene {
+    /// Reads a glTF 2.0 file, `.gltf` or `.glb`, with the buffers that it refers to.
+    ///
+    /// What the file asks for and the renderer doesn't do yet is named in [`Scene::warnings`].
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`], one line, if the file or one of its buffers can't be read or is damaged, if it requires an
+    /// extension that isn't supported, or if it shows no triangle or no light.
+    pub fn load(path: &Path) -> Result<Self> {
+        load(path).map_err(|what| Error::scene(path, what))
+    }
+}
+
+fn load(path: &Path) -> Check<Scene> {
+    let document = Document::read(path)?;
+    let root = &document.root;
+    let nodes = place_nodes(root)?;
+    let mut warnings = Warnings::default();
+    warn_of_ignored(&document, &nodes, &mut warnings);
+
+    let instances = geometry::instances(&document, &nodes, &mut warnings)?;
+    let geometry = geometry::assemble(root, &instances, &mut warnings)?;
+
+    let mut used = vec![false; root.materials.len() + 1];
+    for object in &geometry.objects {
+        used[object.material as usize] = true;
+    }
+    let mut materials = material::materials(root, &used, &mut warnings)?;
+    if used.last() == Some(&false) {
+        materials.pop();
+    }
+
+    let cameras = camera::cameras(root, &nodes, geometry.normalisation, &mut warnings)?;
+    let mut scene = Scene {
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        positions: geometry.positions,
+        normals: geometry.normals,
+        triangles: geometry.triangles,
+        objects: geometry.objects,
+        materials,
+        cameras,
+        normalisation: geometry.normalisation,
+        dropped_triangles: geometry.dropped_triangles,
+        warnings: Vec::new(),
+    };
+    if scene.cameras.is_empty() {
+        warnings.push("it has no perspective camera; one that is framed on its bounds is used".into());
+        scene.cameras.push(camera::framed_on(scene.bounds()));
+    }
+    if scene.emissive_triangles().is_empty() {
+        return Err(
+            "no light: no triangle has a material that emits; give one an emissiveFactor \
+             (KHR_lights_punctual lights aren't supported yet)"
+                .into(),
+        );
+    }
+    scene.warnings = warnings.into_lines();
+    Ok(scene)
+}
+
+/// Warns of what applies to the file as a whole.
+fn warn_of_ignored(document: &Document, nodes: &[PlacedNode<'_>], warnings: &mut Warnings) {
+    let root = &document.root;
+    let has_light = |placed: &&PlacedNode<'_>| {
+        let extensions = placed.node.extensions.as_ref();
+        extensions.is_some_and(|extensions| extensions.others.contains_key(LIGHTS_EXTENSION))
+    };
+    let lights = nodes.iter().filter(has_light).count();
+    if lights > 0 {
+        warnings.push(format!(
+            "{LIGHTS_EXTENSION} isn't supported yet; {lights} lights are skipped"
+        ));
+    }
+    for extension in &root.extensions_used {
+        if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) && extension != LIGHTS_EXTENSION {
+            warnings.push(format!(
+                "the extension {} isn't supported and is ignored",
+                quote(extension)
+            ));
+        }
+    }
+    if !root.animations.is_empty() {
+        warnings.push("animations aren't supported; the nodes are rendered where they stand in the file".into());
+    }
+    if nodes.iter().any(|placed| placed.node.skin.is_some()) {
+        warnings.push("skins aren't supported; the meshes are rendered as they are in the file".into());
+    }
+}

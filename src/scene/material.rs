@@ -1,0 +1,295 @@
+//! Reduces glTF materials to what the renderer does, and says what is left out.
+
+use glam::Vec3;
+use gltf::json;
+use gltf::json::extensions::material::Volume;
+use gltf::json::material::AlphaMode;
+use gltf::json::validation::Checked;
+
+use super::diagnostic::{Check, Warnings, damaged, label, list, quote, shorten};
+use super::{Material, Surface};
+
+/// Index of refraction where the file gives none.
+const DEFAULT_IOR: f32 = 1.5;
+
+/// Largest index of refraction: far above any material's, and its square is far from the end of f32.
+const MAX_IOR: f32 = 100.0;
+
+/// Converts every material of the file, and the default material after them.
+///
+/// Only those that `used` marks (one flag for each, the default's last) give rise to warnings.
+pub(super) fn materials(root: &json::Root, used: &[bool], warnings: &mut Warnings) -> Check<Vec<Material>> {
+    let default = json::Material {
+        name: Some("default".into()),
+        ..Default::default()
+    };
+    let mut materials = Vec::with_capacity(root.materials.len() + 1);
+    let mut with_specular_lobe = Vec::new();
+    for (index, json) in root.materials.iter().chain([&default]).enumerate() {
+        let mut reader = Reader {
+            json,
+            warnings: Vec::new(),
+        };
+        let label = label("material", index, json.name.as_deref());
+        let material = reader.read(index).map_err(|what| format!("{label}: {what}"))?;
+        if used[index] {
+            for warning in reader.warnings {
+                warnings.push(format!("{label}: {warning}"));
+            }
+            if has_specular_lobe(json, &material) {
+                with_specular_lobe.push(quote(&material.name));
+            }
+        }
+        materials.push(material);
+    }
+    if !with_specular_lobe.is_empty() {
+        warnings.push(format!(
+            "the specular lobe over the base colour isn't supported yet and is left out of {} \
+             (a KHR_materials_specular factor of 0 turns it off)",
+            list(&with_specular_lobe)
+        ));
+    }
+    Ok(materials)
+}
+
+/// Whether glTF gives the material a dielectric's reflection on top of what is rendered as matte.
+fn has_specular_lobe(json: &json::Material, material: &Material) -> bool {
+    let specular = json
+        .extensions
+        .as_ref()
+        .and_then(|extensions| extensions.specular.as_ref());
+    let is_off = specular.is_some_and(|specular| specular.specular_factor.0 == 0.0);
+    let is_metal = json.pbr_metallic_roughness.metallic_factor.0 >= 1.0;
+    material.surface == Surface::Matte && !is_off && !is_metal
+}
+
+/// One material with the warnings about it.
+struct Reader<'a> {
+    json: &'a json::Material,
+    warnings: Vec<String>,
+}
+
+impl Reader<'_> {
+    fn read(&mut self, index: usize) -> Check<Material> {
+        self.warn_of_textures();
+        match self.json.alpha_mode {
+            Checked::Valid(AlphaMode::Opaque) => {}
+            Checked::Valid(mode) => self.warn(format!("alphaMode {mode:?} isn't supported yet; it is rendered opaque")),
+            Checked::Invalid => return Err(damaged("its alphaMode is none of OPAQUE, MASK and BLEND")),
+        }
+        let [red, green, blue, _] = self.json.pbr_metallic_roughness.base_color_factor.0;
+        let base_color = self.fractions("baseColorFactor", [red, green, blue])?;
+        Ok(Material {
+            name: match &self.json.name {
+                Some(name) => shorten(name),
+                None => format!("material {index}"),
+            },
+            surface: self.surface()?,
+            base_color: base_color.into(),
+            emission: self.emission()?,
+            double_sided: self.json.double_sided,
+        })
+    }
+
+    /// A metal is a metal even where it claims to transmit: glTF mixes the two lobes by metallicFactor first.
+    fn surface(&mut self) -> Check<Surface> {
+        let pbr = &self.json.pbr_metallic_roughness;
+        let [metallic] = self.fractions("metallicFactor", [pbr.metallic_factor.0])?;
+        let [roughness] = self.fractions("roughnessFactor", [pbr.roughness_factor.0])?;
+        let transmission = self.extension(|extensions| extensions.transmission.as_ref());
+        let transmission = transmission.map_or(0.0, |transmission| transmission.transmission_factor.0);
+        let [transmission] = self.fractions("transmissionFactor", [transmission])?;
+        let ior = self.ior()?;
+        self.check_specular()?;
+        self.check_volume()?;
+
+        if metallic == 1.0 {
+            if transmission > 0.0 {
+                self.warn("metallicFactor 1 leaves nothing of its transmission; set it to 0 for glass".into());
+            }
+            if roughness == 0.0 {
+                return Ok(Surface::Mirror);
+            }
+            self.warn(format!(
+                "metallic with roughness {roughness} isn't supported yet; it is rendered matte in its base colour"
+            ));
+            return Ok(Surface::Matte);
+        }
+        if metallic > 0.0 {
+            let surface = if transmission > 0.0 { "glass" } else { "matte" };
+            self.warn(format!(
+                "metallicFactor {metallic}, between 0 and 1, isn't supported yet; it is rendered {surface}"
+            ));
+        }
+        if transmission == 0.0 {
+            return Ok(Surface::Matte);
+        }
+        self.warn_of_glass(transmission, roughness);
+        Ok(Surface::Dielectric { ior })
+    }
+
+    fn ior(&mut self) -> Check<f32> {
+        let ior = self.extension(|extensions| extensions.ior.as_ref());
+        let ior = ior.map_or(DEFAULT_IOR, |ior| ior.ior.0);
+        if ior == 0.0 {
+            self.warn(format!(
+                "an index of refraction of 0 (total reflection) isn't supported; {DEFAULT_IOR} is used"
+            ));
+            return Ok(DEFAULT_IOR);
+        }
+        if !(1.0..=MAX_IOR).contains(&ior) {
+            return Err(format!(
+                "its index of refraction is {ior}, but it must be 0 or from 1 to {MAX_IOR}; correct it in the file"
+            ));
+        }
+        Ok(ior)
+    }
+
+    fn emission(&mut self) -> Check<Vec3> {
+        let strength = self.extension(|extensions| extensions.emissive_strength.as_ref());
+        let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
+        let [strength] = not_negative("emissiveStrength", [strength])?;
+        // Factors above 1 occur in files that are older than the extension, and mean what they say.
+        let factor = not_negative("emissiveFactor", self.json.emissive_factor.0)?;
+        let emission = factor.map(|factor| factor * strength);
+        Ok(not_negative("emissiveFactor times emissiveStrength", emission)?.into())
+    }
+
+    fn warn_of_glass(&mut self, transmission: f32, roughness: f32) {
+        if transmission < 1.0 {
+            self.warn(format!(
+                "transmissionFactor {transmission}, below 1, isn't supported yet; it is rendered as clear glass"
+            ));
+        }
+        if roughness > 0.0 {
+            self.warn(format!(
+                "transmission with roughness {roughness} isn't supported yet; it is rendered smooth"
+            ));
+        }
+        let volume = self.extension(|extensions| extensions.volume.as_ref());
+        if volume.is_none_or(|volume| volume.thickness_factor.0 == 0.0) {
+            self.warn(
+                "transmission without a KHR_materials_volume thickness is a thin wall in glTF, which isn't supported \
+                 yet; it is rendered as the boundary of a solid"
+                    .into(),
+            );
+        } else if volume.is_some_and(absorbs) {
+            self.warn("absorption (attenuationColor) isn't supported yet and is left out".into());
+        }
+        let specular = self.extension(|extensions| extensions.specular.as_ref());
+        let is_changed = |specular: &json::extensions::material::Specular| {
+            specular.specular_factor.0 != 1.0 || specular.specular_color_factor.0 != [1.0; 3]
+        };
+        if specular.is_some_and(is_changed) {
+            self.warn(
+                "KHR_materials_specular on glass isn't supported yet; its reflection follows the ior alone".into(),
+            );
+        }
+    }
+
+    fn check_specular(&mut self) -> Check<()> {
+        let Some(specular) = self.extension(|extensions| extensions.specular.as_ref()) else {
+            return Ok(());
+        };
+        let (factor, color) = (specular.specular_factor.0, specular.specular_color_factor.0);
+        self.fractions("specularFactor", [factor])?;
+        not_negative("specularColorFactor", color)?;
+        Ok(())
+    }
+
+    fn check_volume(&mut self) -> Check<()> {
+        let Some(volume) = self.extension(|extensions| extensions.volume.as_ref()) else {
+            return Ok(());
+        };
+        let (color, distance) = (volume.attenuation_color.0, volume.attenuation_distance.0);
+        not_negative("thicknessFactor", [volume.thickness_factor.0])?;
+        self.fractions("attenuationColor", color)?;
+        // Infinity is the default.
+        if distance.is_nan() || distance <= 0.0 {
+            return Err(format!(
+                "its attenuationDistance is {distance}, but it must be positive; correct it in the file"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Names the textures. Not the thickness's: it is for renderers that don't trace through the solid.
+    fn warn_of_textures(&mut self) {
+        let json = self.json;
+        let pbr = &json.pbr_metallic_roughness;
+        let transmission = self.extension(|extensions| extensions.transmission.as_ref());
+        let specular = self.extension(|extensions| extensions.specular.as_ref());
+        let slots = [
+            ("baseColorTexture", pbr.base_color_texture.is_some()),
+            ("metallicRoughnessTexture", pbr.metallic_roughness_texture.is_some()),
+            ("normalTexture", json.normal_texture.is_some()),
+            ("occlusionTexture", json.occlusion_texture.is_some()),
+            ("emissiveTexture", json.emissive_texture.is_some()),
+            (
+                "transmissionTexture",
+                transmission.is_some_and(|transmission| transmission.transmission_texture.is_some()),
+            ),
+            (
+                "specularTexture",
+                specular.is_some_and(|specular| specular.specular_texture.is_some()),
+            ),
+            (
+                "specularColorTexture",
+                specular.is_some_and(|specular| specular.specular_color_texture.is_some()),
+            ),
+        ];
+        let present: Vec<String> = slots
+            .into_iter()
+            .filter(|(_, is_present)| *is_present)
+            .map(|(slot, _)| slot.to_owned())
+            .collect();
+        if !present.is_empty() {
+            self.warn(format!(
+                "textures aren't supported yet; the factors are used without {}",
+                list(&present)
+            ));
+        }
+    }
+
+    fn extension<'s, T>(
+        &'s self,
+        select: impl FnOnce(&'s json::extensions::material::Material) -> Option<&'s T>,
+    ) -> Option<&'s T> {
+        self.json.extensions.as_ref().and_then(select)
+    }
+
+    /// Factors from 0 to 1. Larger ones are cut to 1 with a warning.
+    fn fractions<const N: usize>(&mut self, what: &str, values: [f32; N]) -> Check<[f32; N]> {
+        let values = not_negative(what, values)?;
+        if values.iter().any(|&value| value > 1.0) {
+            self.warn(format!("{what} {} is above 1 and cut to it", spell(&values)));
+        }
+        Ok(values.map(|value| value.min(1.0)))
+    }
+
+    fn warn(&mut self, warning: String) {
+        self.warnings.push(warning);
+    }
+}
+
+/// Whether light that passes through loses any.
+fn absorbs(volume: &Volume) -> bool {
+    volume.attenuation_distance.0.is_finite() && volume.attenuation_color.0 != [1.0; 3]
+}
+
+/// Checks that no value is negative, infinite or not a number.
+fn not_negative<const N: usize>(what: &str, values: [f32; N]) -> Check<[f32; N]> {
+    if values.iter().all(|&value| value >= 0.0 && value.is_finite()) {
+        Ok(values)
+    } else {
+        Err(format!(
+            "its {what} is {}, but it must be finite and not negative; correct it in the file",
+            spell(&values)
+        ))
+    }
+}
+
+fn spell(values: &[f32]) -> String {
+    let values: Vec<String> = values.iter().map(f32::to_string).collect();
+    values.join(" ")
+}

@@ -1,0 +1,160 @@
+//! A scene as the renderer sees it: triangles in render space, materials, lights and cameras.
+//!
+//! *Render space* is world space recentred and rescaled in f64, so that the scene's bounds are centred on the origin
+//! and their longest half axis is 1. Whatever the units and the place of the scene, f32 then has the same precision.
+
+mod accessor;
+mod buffer;
+mod builder;
+mod bvh;
+mod camera;
+mod diagnostic;
+mod document;
+mod facet;
+mod geometry;
+mod glb;
+mod graph;
+mod light;
+mod load;
+mod material;
+pub mod packed;
+mod primitive;
+
+pub use packed::PackedScene;
+
+use glam::{DVec3, Vec3};
+
+pub use light::EmissiveTriangle;
+
+/// The map from world space to render space: `render = (world − centre) · scale`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Normalisation {
+    /// Centre of the scene's bounds, in world units.
+    pub centre: DVec3,
+    /// Render units per world unit.
+    pub scale: f64,
+}
+
+impl Normalisation {
+    /// The point of render space that is `world` in world space.
+    pub fn to_render(self, world: DVec3) -> Vec3 {
+        ((world - self.centre) * self.scale).as_vec3()
+    }
+}
+
+/// How a surface scatters light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Surface {
+    /// Lambertian reflection with the material's base colour as albedo.
+    Matte,
+    /// Perfect mirror: Schlick's Fresnel with the base colour as reflectance at normal incidence.
+    Mirror,
+    /// Smooth boundary of a dielectric.
+    Dielectric {
+        /// Index of refraction inside, relative to vacuum.
+        ior: f32,
+    },
+}
+
+/// A glTF material, reduced to what is supported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Name in the file, or `material N`.
+    pub name: String,
+    /// How it scatters.
+    pub surface: Surface,
+    /// Linear RGB albedo (matte), reflectance (mirror) or tint of each crossing (dielectric); each in 0 ..= 1.
+    pub base_color: Vec3,
+    /// Emitted radiance, linear RGB; zero for what isn't a light.
+    pub emission: Vec3,
+    /// Whether the back side emits as well. (Every surface scatters on both sides.)
+    pub double_sided: bool,
+}
+
+/// One primitive of one mesh instance: the unit within which photons and visible points meet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// Name of the node or mesh.
+    pub name: String,
+    /// Index into [`Scene::materials`].
+    pub material: u32,
+    /// Its triangles in [`Scene::triangles`].
+    pub triangles: std::ops::Range<u32>,
+}
+
+/// A triangle of an object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Triangle {
+    /// Indices into [`Scene::positions`] and [`Scene::normals`], counter-clockwise seen from the front.
+    pub vertices: [u32; 3],
+    /// Index into [`Scene::objects`].
+    pub object: u32,
+}
+
+/// A pinhole camera in render space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Name in the file, or `camera N`.
+    pub name: String,
+    /// Centre of projection.
+    pub position: Vec3,
+    /// Unit vector to the picture's right.
+    pub right: Vec3,
+    /// Unit vector to the picture's top.
+    pub up: Vec3,
+    /// Unit vector into the picture.
+    pub forward: Vec3,
+    /// Tangent of half the vertical angle of view.
+    pub tan_half_fov: f32,
+    /// Width over height where the file gives it.
+    pub aspect: Option<f32>,
+}
+
+/// A scene, ready to render.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// File name without its extension.
+    pub name: String,
+    /// Vertex positions in render space.
+    pub positions: Vec<Vec3>,
+    /// Unit shading normals, one per position.
+    pub normals: Vec<Vec3>,
+    /// Triangles, grouped by object.
+    pub triangles: Vec<Triangle>,
+    /// Objects.
+    pub objects: Vec<Object>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Cameras; at least one.
+    pub cameras: Vec<Camera>,
+    /// How render space lies in world space.
+    pub normalisation: Normalisation,
+    /// Triangles of zero area that were dropped.
+    pub dropped_triangles: usize,
+    /// What the file asks for and the renderer doesn't do, one line each.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// Lower and upper corner of the bounds of all vertices, in render space.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.positions
+            .iter()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), &position| {
+                (lower.min(position), upper.max(position))
+            })
+    }
+
+    /// Area of the triangle with that index, in square render units.
+    pub fn triangle_area(&self, triangle: u32) -> f64 {
+        let corners = self.triangles[triangle as usize].vertices;
+        let [a, b, c] = corners.map(|vertex| self.positions[vertex as usize].as_dvec3());
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Area of the object with that index, in square render units.
+    pub fn object_area(&self, object: u32) -> f64 {
+        let triangles = self.objects[object as usize].triangles.clone();
+        triangles.map(|triangle| self.triangle_area(triangle)).sum()
+    }
+}

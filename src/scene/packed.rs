@@ -1,0 +1,166 @@
+//! A scene in the layout of the device.
+
+use glam::{DVec3, Vec3};
+
+use super::{Scene, Surface, bvh};
+use crate::layout::{BvhNode, HavelTriangle, Light, Material, ShadingTriangle};
+
+/// What the ray stages read, in the order of the BVH's leaves.
+#[derive(Debug, Clone)]
+pub struct PackedScene {
+    /// Hierarchy, the root first.
+    pub bvh: Vec<BvhNode>,
+    /// Triangles for intersection.
+    pub havel_triangles: Vec<HavelTriangle>,
+    /// The same triangles for shading.
+    pub shading_triangles: Vec<ShadingTriangle>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Emissive triangles.
+    pub lights: Vec<Light>,
+    /// Σ mean(Le) · π · area · sides over the lights, render units.
+    pub light_flux: f64,
+    /// Index in [`Scene::triangles`] of each packed triangle.
+    pub order: Vec<u32>,
+    /// Render units per scene unit.
+    pub scale: f64,
+}
+
+impl PackedScene {
+    /// Builds the hierarchy and precomputes the triangles.
+    ///
+    /// # Errors
+    /// A text, if the hierarchy is too deep.
+    pub fn new(scene: &Scene) -> Result<Self, String> {
+        let corners: Vec<[Vec3; 3]> = scene
+            .triangles
+            .iter()
+            .map(|triangle| triangle.vertices.map(|vertex| scene.positions[vertex as usize]))
+            .collect();
+        let bvh = bvh::build(&corners)?;
+        let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| corners[index as usize]).collect();
+        let (lights, light_flux) = lights(scene, &bvh.order);
+        Ok(Self {
+            havel_triangles: corners.iter().map(havel_triangle).collect(),
+            shading_triangles: bvh
+                .order
+                .iter()
+                .zip(&corners)
+                .map(|(&index, corners)| shading_triangle(scene, index, corners))
+                .collect(),
+            materials: scene.materials.iter().map(material).collect(),
+            lights,
+            light_flux,
+            bvh: bvh.nodes,
+            order: bvh.order,
+            scale: scene.normalisation.scale,
+        })
+    }
+}
+
+/// Havel and Herout, «Yet faster ray-triangle intersection (using SSE4)», 2010, with u and v for the second and the
+/// third corner. In f64, since the planes of small triangles cancel.
+pub fn havel_triangle(corners: &[Vec3; 3]) -> HavelTriangle {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let (ab, ac) = (b - a, c - a);
+    let n = ab.cross(ac);
+    let n2 = n.length_squared();
+    let n_u = ac.cross(n) / n2;
+    let n_v = n.cross(ab) / n2;
+    let plane = |n: DVec3, d: f64| [n.x as f32, n.y as f32, n.z as f32, d as f32];
+    // The normal's length cancels in t = (d − o·n) / (r·n); scaled to 1 it keeps small triangles within f32's range.
+    let unit = n / n2.sqrt();
+    HavelTriangle {
+        n0: plane(unit, unit.dot(a)),
+        n1: plane(n_u, -n_u.dot(a)),
+        n2: plane(n_v, -n_v.dot(a)),
+    }
+}
+
+fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTriangle {
+    let triangle = scene.triangles[index as usize];
+    let normals = triangle.vertices.map(|vertex| scene.normals[vertex as usize]);
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let geometric = (b - a).cross(c - a).normalize().as_vec3();
+    let smooth_shaded = normals.iter().any(|normal| normal.dot(geometric) < 0.999_999);
+    let vertex = |i: usize| {
+        let p = corners[i];
+        [p.x, p.y, p.z, f32::from_bits(encode_direction(normals[i]))]
+    };
+    ShadingTriangle {
+        p0: vertex(0),
+        p1: vertex(1),
+        p2: vertex(2),
+        object: triangle.object,
+        material: scene.objects[triangle.object as usize].material,
+        smooth_shaded: smooth_shaded.into(),
+        padding: 0,
+    }
+}
+
+fn material(material: &super::Material) -> Material {
+    let (surface, ior) = match material.surface {
+        Surface::Matte => (0, 1.0),
+        Surface::Mirror => (1, 1.0),
+        Surface::Dielectric { ior } => (2, ior),
+    };
+    Material {
+        base_color: material.base_color.to_array(),
+        surface,
+        emission: material.emission.to_array(),
+        ior,
+        double_sided: material.double_sided.into(),
+        padding0: 0,
+        padding1: 0,
+        padding2: 0,
+    }
+}
+
+/// Emissive triangles in leaf order, with probabilities in proportion to their flux.
+fn lights(scene: &Scene, order: &[u32]) -> (Vec<Light>, f64) {
+    let mut place = vec![0; order.len()];
+    for (packed, &index) in order.iter().enumerate() {
+        place[index as usize] = packed as u32;
+    }
+    let mut emissive = scene.emissive_triangles();
+    emissive.sort_by_key(|light| place[light.triangle as usize]);
+    let total: f64 = emissive.iter().map(|light| light.power).sum();
+    let mut before = 0.0;
+    let count = emissive.len();
+    let lights = emissive
+        .iter()
+        .enumerate()
+        .map(|(i, light)| {
+            before += light.power;
+            Light {
+                triangle: place[light.triangle as usize],
+                cumulative: if i + 1 == count { 1.0 } else { (before / total) as f32 },
+                probability: (light.power / total) as f32,
+                area: light.area as f32,
+            }
+        })
+        .collect();
+    (lights, total)
+}
+
+/// Unit vector to two 16-bit numbers, as `glsl/shared/sampling.glsl` has it.
+pub fn encode_direction(direction: Vec3) -> u32 {
+    let length = direction.abs().element_sum();
+    let (mut x, mut y) = (direction.x / length, direction.y / length);
+    if direction.z < 0.0 {
+        (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
+    }
+    let quantise = |value: f32| u32::from((value.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);
+    quantise(x) | quantise(y) << 16
+}
+
+/// The inverse of [`encode_direction`].
+pub fn decode_direction(code: u32) -> Vec3 {
+    let value = |bits: u32| f32::from(bits as u16 as i16).max(-32767.0) / 32767.0;
+    let (mut x, mut y) = (value(code), value(code >> 16));
+    let z = 1.0 - x.abs() - y.abs();
+    if z < 0.0 {
+        (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
+    }
+    Vec3::new(x, y, z).normalize()
+}

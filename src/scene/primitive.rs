@@ -1,0 +1,182 @@
+//! A mesh primitive as a list of triangles, whatever its topology and index type.
+
+use glam::DVec3;
+use gltf::json::mesh::{Mode, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{Mesh, mesh};
+
+use super::accessor::{IndexAccessor, Vec3Accessor};
+use super::diagnostic::{Check, Warnings, damaged, label};
+use super::document::Document;
+
+/// A primitive whose accessors were checked. Only its indices and vertices are still to be.
+pub(super) struct Primitive<'a> {
+    /// Index of the material, or one past the last for the default material.
+    pub material: usize,
+    topology: Topology,
+    positions: Vec3Accessor<'a>,
+    normals: Option<Vec3Accessor<'a>>,
+    indices: Option<IndexAccessor<'a>>,
+}
+
+/// How a sequence of vertices forms triangles.
+#[derive(Clone, Copy)]
+enum Topology {
+    List,
+    Strip,
+    Fan,
+}
+
+impl<'a> Primitive<'a> {
+    /// Opens a primitive; `None` if it has no triangles. Parts that aren't supported are added to `warnings`.
+    pub(super) fn open(
+        document: &'a Document,
+        mesh: &Mesh,
+        primitive: &mesh::Primitive,
+        label: &str,
+        warnings: &mut Warnings,
+    ) -> Check<Option<Self>> {
+        let topology = match primitive.mode {
+            Checked::Valid(Mode::Triangles) => Topology::List,
+            Checked::Valid(Mode::TriangleStrip) => Topology::Strip,
+            Checked::Valid(Mode::TriangleFan) => Topology::Fan,
+            Checked::Valid(mode) => {
+                warnings.push(format!(
+                    "{label}: its {mode:?} are skipped: only triangles are rendered"
+                ));
+                return Ok(None);
+            }
+            Checked::Invalid => return Err(damaged("its mode is none of 0 to 6")),
+        };
+        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
+        let Some(positions) = attribute(Semantic::Positions) else {
+            warnings.push(format!("{label}: it has no POSITION and is skipped"));
+            return Ok(None);
+        };
+        let positions = Vec3Accessor::open(document, positions).map_err(|what| format!("POSITION, {what}"))?;
+        let normals = attribute(Semantic::Normals)
+            .map(|index| Vec3Accessor::open(document, index))
+            .transpose()
+            .map_err(|what| format!("NORMAL, {what}"))?;
+        if let Some(normals) = normals
+            && normals.len() != positions.len()
+        {
+            let what = format!("{} normals for {} positions", normals.len(), positions.len());
+            return Err(damaged(what));
+        }
+        let indices = primitive
+            .indices
+            .map(|index| IndexAccessor::open(document, index))
+            .transpose()
+            .map_err(|what| format!("indices, {what}"))?;
+        let materials = document.root.materials.len();
+        let material = primitive.material.map_or(Ok(materials), |index| {
+            if index.value() < materials {
+                Ok(index.value())
+            } else {
+                Err(damaged(format_args!(
+                    "there is no material {index}, the file has {materials}"
+                )))
+            }
+        })?;
+
+        warn_of_ignored(mesh, primitive, label, warnings);
+        let opened = Self {
+            material,
+            topology,
+            positions,
+            normals,
+            indices,
+        };
+        let excess = opened.sequence_length() % 3;
+        if matches!(topology, Topology::List) && excess != 0 {
+            warnings.push(format!(
+                "{label}: its last {excess} indices form no triangle and are skipped"
+            ));
+        }
+        Ok((opened.triangle_count() > 0).then_some(opened))
+    }
+
+    /// Number of triangles.
+    pub(super) fn triangle_count(&self) -> usize {
+        match self.topology {
+            Topology::List => self.sequence_length() / 3,
+            Topology::Strip | Topology::Fan => self.sequence_length().saturating_sub(2),
+        }
+    }
+
+    /// Number of vertices.
+    pub(super) fn vertex_count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// The vertices of a triangle, checked to exist, counter-clockwise from the front.
+    pub(super) fn triangle(&self, triangle: usize) -> Check<[usize; 3]> {
+        let corners = match self.topology {
+            Topology::List => [3 * triangle, 3 * triangle + 1, 3 * triangle + 2],
+            // Every other triangle of a strip is turned round, so that all face the same way.
+            Topology::Strip => [triangle, triangle + 1 + triangle % 2, triangle + 2 - triangle % 2],
+            Topology::Fan => [triangle + 1, triangle + 2, 0],
+        };
+        let mut vertices = [0; 3];
+        for (vertex, corner) in vertices.iter_mut().zip(corners) {
+            *vertex = self.indices.map_or(corner, |indices| indices.get(corner) as usize);
+            if *vertex >= self.positions.len() {
+                return Err(damaged(format_args!(
+                    "its index {corner} is vertex {vertex}, but it has {} vertices",
+                    self.positions.len()
+                )));
+            }
+        }
+        Ok(vertices)
+    }
+
+    /// Position of a vertex in the node's space, checked to be finite.
+    pub(super) fn position(&self, vertex: usize) -> Check<DVec3> {
+        finite(self.positions, vertex)
+            .ok_or_else(|| damaged(format_args!("the position of vertex {vertex} isn't finite")))
+    }
+
+    /// Normal of a vertex in the node's space as the file gives it, checked to be finite; `None` where it gives none.
+    pub(super) fn normal(&self, vertex: usize) -> Check<Option<DVec3>> {
+        self.normals
+            .map(|normals| {
+                finite(normals, vertex)
+                    .ok_or_else(|| damaged(format_args!("the normal of vertex {vertex} isn't finite")))
+            })
+            .transpose()
+    }
+
+    fn sequence_length(&self) -> usize {
+        self.indices.map_or(self.positions.len(), |indices| indices.len())
+    }
+}
+
+/// `mesh 1 "name", primitive 0`.
+pub(super) fn primitive_label(mesh_index: usize, mesh: &Mesh, primitive_index: usize) -> String {
+    let mesh = label("mesh", mesh_index, mesh.name.as_deref());
+    format!("{mesh}, primitive {primitive_index}")
+}
+
+fn finite(accessor: Vec3Accessor<'_>, index: usize) -> Option<DVec3> {
+    let vector = accessor.get(index);
+    vector
+        .iter()
+        .all(|component| component.is_finite())
+        .then(|| DVec3::from_array(vector.map(f64::from)))
+}
+
+fn warn_of_ignored(mesh: &Mesh, primitive: &mesh::Primitive, label: &str, warnings: &mut Warnings) {
+    let is_color = |semantic: &Checked<Semantic>| matches!(semantic, Checked::Valid(Semantic::Colors(_)));
+    if primitive.attributes.keys().any(is_color) {
+        warnings.push(format!(
+            "{label}: its vertex colours aren't supported yet and are left out"
+        ));
+    }
+    let is_morphed = primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty());
+    if is_morphed || mesh.weights.is_some() {
+        warnings.push(format!(
+            "{label}: its morph targets aren't supported; the base shape is rendered"
+        ));
+    }
+}

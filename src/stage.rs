@@ -1,0 +1,221 @@
+//! What a stage is: data that says which shader runs, on how many invocations, with which constants. Knows no Vulkan.
+
+use std::borrow::Cow;
+
+/// Every buffer that a shader can name. A block `Photons` in GLSL is the buffer `BufferId::Photons`.
+///
+/// The last group has no memory of its own: these are formal parameters of stages that serve several buffers, and a
+/// [`StageDesc`] says which buffer each stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum BufferId {
+    /// [`crate::layout::Settings`].
+    Settings,
+    /// [`crate::layout::BvhNode`]s, the root first.
+    Bvh,
+    /// [`crate::layout::HavelTriangle`]s in the order of the BVH's leaves.
+    HavelTriangles,
+    /// [`crate::layout::ShadingTriangle`]s in the same order.
+    ShadingTriangles,
+    /// [`crate::layout::Material`]s.
+    Materials,
+    /// [`crate::layout::Light`]s.
+    Lights,
+    /// [`crate::layout::VisiblePoint`]s in slot order.
+    VisiblePoints,
+    /// [`crate::layout::Statistics`] of each slot.
+    StatisticsOf,
+    /// [`crate::layout::Gathered`] of each slot.
+    GatheredOf,
+    /// [`crate::layout::DirectSum`] of each slot.
+    DirectSums,
+    /// [`crate::layout::RadiusSum`] of each workgroup of slots.
+    RadiusSums,
+    /// [`crate::layout::Photon`]s as the lanes store them: number-major, `[number][lane]`.
+    LanePhotons,
+    /// Photons that each lane stored, u32.
+    LaneCounts,
+    /// Photons of the lanes before, u32.
+    LaneOffsets,
+    /// Number of photons of the batch, one u32.
+    PhotonCount,
+    /// [`crate::layout::Photon`]s in path order within their lane.
+    Photons,
+    /// [`crate::layout::Photon`]s in the order of their grid cells.
+    SortedPhotons,
+    /// [`crate::layout::GridShape`].
+    Grid,
+    /// First photon of each grid bucket, u32.
+    CellStarts,
+    /// One past the last photon of each grid bucket, u32; 0 for an empty one.
+    CellEnds,
+    /// Sort keys, u32.
+    Keys,
+    /// What is sorted by [`BufferId::Keys`], u32.
+    Values,
+    /// Sort keys after every other pass.
+    OtherKeys,
+    /// Values after every other pass.
+    OtherValues,
+    /// Digit counts of a sort pass, u32, `[digit][tile]`.
+    Histograms,
+    /// Block sums of a prefix sum, u32.
+    ScanSums,
+    /// Sum of all that a prefix sum went over, one u32.
+    ScanTotal,
+    /// RGBA f32 picture, row-major from the top left.
+    Film,
+    /// [`crate::layout::StatusCounters`].
+    Status,
+
+    /// Parameter: the numbers that a prefix sum is taken of.
+    Scan,
+    /// Parameter: how many keys to sort, one u32.
+    SortCount,
+    /// Parameter: keys before a sort pass.
+    KeysIn,
+    /// Parameter: values before a sort pass.
+    ValuesIn,
+    /// Parameter: keys after a sort pass.
+    KeysOut,
+    /// Parameter: values after a sort pass.
+    ValuesOut,
+}
+
+/// How a shader uses a buffer, from the block's qualifiers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// `readonly`.
+    Read,
+    /// `writeonly`.
+    Write,
+    /// Neither.
+    ReadWrite,
+    /// A uniform block.
+    Uniform,
+}
+
+impl Access {
+    /// Whether the shader may write.
+    pub fn writes(self) -> bool {
+        matches!(self, Self::Write | Self::ReadWrite)
+    }
+}
+
+/// A member of a struct in GLSL, as reflection gives it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Field {
+    /// Name in GLSL.
+    pub name: &'static str,
+    /// Bytes from the struct's beginning.
+    pub offset: usize,
+    /// Bytes; 0 for an array without a length.
+    pub size: usize,
+}
+
+/// A struct in GLSL, as reflection gives it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StructLayout {
+    /// Name in GLSL.
+    pub name: &'static str,
+    /// Members in order.
+    pub fields: &'static [Field],
+}
+
+impl StructLayout {
+    /// Bytes up to the last member's end.
+    pub fn size(&self) -> usize {
+        self.fields.iter().map(|field| field.offset + field.size).max().unwrap_or(0)
+    }
+}
+
+/// A buffer that a shader binds.
+#[derive(Debug, Clone, Copy)]
+pub struct Binding {
+    /// Binding number in descriptor set 0.
+    pub slot: u32,
+    /// The buffer that its block names.
+    pub buffer: BufferId,
+    /// How it is used.
+    pub access: Access,
+    /// The struct that the block is an array of, or the block itself.
+    pub element: StructLayout,
+}
+
+/// A specialisation constant.
+#[derive(Debug, Clone, Copy)]
+pub struct SpecConstant {
+    /// Its `constant_id`.
+    pub id: u32,
+    /// Its name in GLSL.
+    pub name: &'static str,
+}
+
+/// A compiled stage, as `build.rs` describes it.
+#[derive(Debug)]
+pub struct Shader {
+    /// The stage's name: its file, its timestamps' key, its debug label, its line in the report.
+    pub name: &'static str,
+    /// SPIR-V, little endian.
+    pub spirv: &'static [u8],
+    /// Invocations of a workgroup.
+    pub workgroup: u32,
+    /// What it binds.
+    pub bindings: &'static [Binding],
+    /// Its push constants, where it has any.
+    pub push_constants: Option<StructLayout>,
+    /// Its specialisation constants.
+    pub constants: &'static [SpecConstant],
+}
+
+/// A launch of a stage.
+#[derive(Debug, Clone)]
+pub struct StageDesc {
+    /// What runs.
+    pub shader: &'static Shader,
+    /// Invocations, rounded up to whole workgroups.
+    pub threads: u32,
+    /// Values of specialisation constants by name; those left out keep the shader's default.
+    pub constants: Cow<'static, [(&'static str, u32)]>,
+    /// Bytes of the push constants.
+    pub push: Vec<u8>,
+    /// Which buffer a formal parameter stands for.
+    pub bound: Cow<'static, [(BufferId, BufferId)]>,
+}
+
+impl StageDesc {
+    /// A launch of `shader` with `threads` invocations.
+    pub fn new(shader: &'static Shader, threads: u32) -> Self {
+        Self { shader, threads, constants: Cow::Borrowed(&[]), push: Vec::new(), bound: Cow::Borrowed(&[]) }
+    }
+
+    /// With these push constants.
+    pub fn push<T: bytemuck::NoUninit>(mut self, constants: T) -> Self {
+        self.push = bytemuck::bytes_of(&constants).to_vec();
+        self
+    }
+
+    /// With these specialisation constants.
+    pub fn constants(mut self, constants: impl Into<Cow<'static, [(&'static str, u32)]>>) -> Self {
+        self.constants = constants.into();
+        self
+    }
+
+    /// With these buffers for the shader's formal parameters.
+    pub fn bind(mut self, bound: impl Into<Cow<'static, [(BufferId, BufferId)]>>) -> Self {
+        self.bound = bound.into();
+        self
+    }
+
+    /// Workgroups.
+    pub fn groups(&self) -> u32 {
+        self.threads.div_ceil(self.shader.workgroup)
+    }
+
+    /// The buffers that the launch uses, parameters replaced.
+    pub fn uses(&self) -> impl Iterator<Item = (u32, BufferId, Access)> + '_ {
+        self.shader.bindings.iter().map(|binding| {
+            let actual = self.bound.iter().find(|(formal, _)| *formal == binding.buffer);
+            (binding.slot, actual.map_or(binding.buffer, |&(_, actual)| actual), binding.access)
+        })
+    }
+}
