@@ -1,0 +1,266 @@
+//! A small writer of glTF 2.0: one JSON document and one binary buffer.
+
+use super::mesh::Mesh;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+
+// Constants of glTF, which are OpenGL's.
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+const UNSIGNED_SHORT: u32 = 5123;
+const FLOAT: u32 = 5126;
+const NEAREST: u32 = 9728;
+const REPEAT: u32 = 10497;
+
+/// A file to write: its name in the scenes' folder, and its content.
+pub struct File {
+    pub name: String,
+    pub bytes: Vec<u8>,
+}
+
+/// A Lambertian surface: a rough dielectric without its specular lobe. Scatters on both sides.
+pub fn matte(name: &str, [r, g, b]: [f64; 3]) -> Value {
+    json!({
+        "name": name,
+        "pbrMetallicRoughness": { "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0 },
+        "doubleSided": true,
+        "extensions": { "KHR_materials_specular": { "specularFactor": 0.0 } },
+    })
+}
+
+/// A black area light that emits from its front.
+pub fn light(name: &str, radiance: [f64; 3]) -> Value {
+    one_sided(emitting(matte(name, [0.0; 3]), radiance))
+}
+
+/// A smooth metal.
+pub fn mirror(name: &str, [r, g, b]: [f64; 3]) -> Value {
+    json!({
+        "name": name,
+        "pbrMetallicRoughness": { "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 1.0, "roughnessFactor": 0.0 },
+    })
+}
+
+/// A smooth, clear dielectric; meshes that have it must be closed.
+pub fn clear(name: &str, ior: f64) -> Value {
+    json!({
+        "name": name,
+        "pbrMetallicRoughness": { "baseColorFactor": [1.0, 1.0, 1.0, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.0 },
+        "extensions": {
+            "KHR_materials_transmission": { "transmissionFactor": 1.0 },
+            "KHR_materials_ior": { "ior": ior },
+            "KHR_materials_volume": { "thicknessFactor": 1.0 },
+        },
+    })
+}
+
+/// `material`, emitting `radiance` as well. glTF's factor ends at 1; an extension carries what is above.
+pub fn emitting(mut material: Value, radiance: [f64; 3]) -> Value {
+    let strength = radiance.into_iter().fold(1.0, f64::max);
+    material["emissiveFactor"] = json!(radiance.map(|value| value / strength));
+    if strength > 1.0 {
+        material["extensions"]["KHR_materials_emissive_strength"] = json!({ "emissiveStrength": strength });
+    }
+    material
+}
+
+/// `material` without its back, which matters to emission alone.
+pub fn one_sided(mut material: Value) -> Value {
+    material["doubleSided"] = json!(false);
+    material
+}
+
+/// A glTF document being put together. What is added gets the next index of its kind.
+pub struct Document {
+    name: &'static str,
+    nodes: Vec<Value>,
+    meshes: Vec<Value>,
+    materials: Vec<Value>,
+    cameras: Vec<Value>,
+    accessors: Vec<Value>,
+    buffer_views: Vec<Value>,
+    texture: Option<Value>,
+    buffer: Vec<u8>,
+}
+
+impl Document {
+    /// An empty scene.
+    pub fn new(name: &'static str) -> Self {
+        Self {
+            name,
+            nodes: Vec::new(),
+            meshes: Vec::new(),
+            materials: Vec::new(),
+            cameras: Vec::new(),
+            accessors: Vec::new(),
+            buffer_views: Vec::new(),
+            texture: None,
+            buffer: Vec::new(),
+        }
+    }
+
+    /// Adds a material and returns its index.
+    pub fn material(&mut self, material: Value) -> usize {
+        push(&mut self.materials, material)
+    }
+
+    /// Adds a matte material whose albedo is the document's one texture, a PNG, repeated without filtering.
+    pub fn textured(&mut self, name: &str, png: &[u8]) -> usize {
+        self.texture = Some(json!({ "bufferView": self.view(png, None), "mimeType": "image/png" }));
+        let mut material = matte(name, [1.0; 3]);
+        material["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": 0 });
+        self.material(material)
+    }
+
+    /// Adds a mesh and a node that shows it.
+    pub fn object(&mut self, name: &str, mesh: &Mesh, material: usize) -> Node<'_> {
+        let positions: Vec<_> = mesh.positions.iter().map(|p| p.as_vec3().to_array()).collect();
+        let normals: Vec<_> = mesh.normals.iter().map(|n| n.as_vec3().to_array()).collect();
+        let texcoords: Vec<_> = mesh.texcoords.iter().map(|t| t.as_vec2().to_array()).collect();
+        let mut attributes = json!({ "POSITION": self.vertex_data(&positions), "NORMAL": self.vertex_data(&normals) });
+        if !texcoords.is_empty() {
+            attributes["TEXCOORD_0"] = json!(self.vertex_data(&texcoords));
+        }
+        let primitive = json!({
+            "attributes": attributes,
+            "indices": self.indices(mesh.triangles.as_flattened()),
+            "material": material,
+        });
+        let mesh = push(&mut self.meshes, json!({ "name": name, "primitives": [primitive] }));
+        self.node(json!({ "name": name, "mesh": mesh }))
+    }
+
+    /// Adds a camera in the plane x = 0 at `eye` that looks at `target` (each y, z), with an aspect ratio of 1.
+    pub fn camera(&mut self, eye: [f64; 2], target: [f64; 2], field_of_view_degrees: f64) {
+        let perspective = json!({
+            "yfov": field_of_view_degrees.to_radians(),
+            "aspectRatio": 1.0,
+            "znear": 0.01,
+            "zfar": 1000.0,
+        });
+        let camera = json!({ "name": "camera", "type": "perspective", "perspective": perspective });
+        let camera = push(&mut self.cameras, camera);
+        let pitch = (target[0] - eye[0]).atan2(eye[1] - target[1]);
+        let mut node = self.node(json!({ "name": "camera", "camera": camera }));
+        node.at([0.0, eye[0], eye[1]]).rotated([1.0, 0.0, 0.0], pitch);
+    }
+
+    /// The document as NAME.gltf and NAME.bin.
+    pub fn finish(self) -> [File; 2] {
+        let extensions: BTreeSet<&String> = self
+            .materials
+            .iter()
+            .filter_map(|material| material.get("extensions")?.as_object())
+            .flat_map(|extensions| extensions.keys())
+            .collect();
+        let binary = format!("{}.bin", self.name);
+        let mut document = json!({
+            "asset": { "version": "2.0", "generator": "ppm-vk make_scenes", "copyright": "CC0-1.0" },
+            "scene": 0,
+            "scenes": [{ "name": self.name, "nodes": (0..self.nodes.len()).collect::<Vec<_>>() }],
+            "nodes": self.nodes,
+            "meshes": self.meshes,
+            "materials": self.materials,
+            "cameras": self.cameras,
+            "accessors": self.accessors,
+            "bufferViews": self.buffer_views,
+            "buffers": [{ "byteLength": self.buffer.len(), "uri": binary }],
+            "extensionsUsed": extensions,
+        });
+        if let Some(image) = self.texture {
+            document["images"] = json!([image]);
+            document["samplers"] =
+                json!([{ "magFilter": NEAREST, "minFilter": NEAREST, "wrapS": REPEAT, "wrapT": REPEAT }]);
+            document["textures"] = json!([{ "sampler": 0, "source": 0 }]);
+        }
+        [
+            File {
+                name: format!("{}.gltf", self.name),
+                bytes: format!("{document:#}\n").into_bytes(),
+            },
+            File {
+                name: binary,
+                bytes: self.buffer,
+            },
+        ]
+    }
+
+    fn node(&mut self, node: Value) -> Node<'_> {
+        let index = push(&mut self.nodes, node);
+        Node(&mut self.nodes[index])
+    }
+
+    /// Adds vectors with their bounds, and returns the accessor.
+    fn vertex_data<const N: usize>(&mut self, vectors: &[[f32; N]]) -> usize {
+        let bytes: Vec<u8> = vectors
+            .as_flattened()
+            .iter()
+            .flat_map(|value| value.to_le_bytes())
+            .collect();
+        let bound = |pick: fn(f32, f32) -> f32| {
+            let bound = vectors
+                .iter()
+                .copied()
+                .reduce(|a, b| std::array::from_fn(|i| pick(a[i], b[i])));
+            // Adding 0 makes −0, of which `min` and `max` take either, 0.
+            bound.map(|bound| bound.map(|value| f64::from(value) + 0.0).to_vec())
+        };
+        let accessor = json!({
+            "bufferView": self.view(&bytes, ARRAY_BUFFER),
+            "componentType": FLOAT,
+            "count": vectors.len(),
+            "type": format!("VEC{N}"),
+            "min": bound(f32::min),
+            "max": bound(f32::max),
+        });
+        push(&mut self.accessors, accessor)
+    }
+
+    /// Adds vertex indices, and returns the accessor.
+    fn indices(&mut self, indices: &[u16]) -> usize {
+        let bytes: Vec<u8> = indices.iter().flat_map(|index| index.to_le_bytes()).collect();
+        let accessor = json!({
+            "bufferView": self.view(&bytes, ELEMENT_ARRAY_BUFFER),
+            "componentType": UNSIGNED_SHORT,
+            "count": indices.len(),
+            "type": "SCALAR",
+        });
+        push(&mut self.accessors, accessor)
+    }
+
+    /// Appends `bytes` to the buffer, and returns the view of them.
+    fn view(&mut self, bytes: &[u8], target: impl Into<Option<u32>>) -> usize {
+        // Accessors must start at multiples of their component's size.
+        self.buffer.resize(self.buffer.len().next_multiple_of(4), 0);
+        let mut view = json!({ "buffer": 0, "byteOffset": self.buffer.len(), "byteLength": bytes.len() });
+        if let Some(target) = target.into() {
+            view["target"] = json!(target);
+        }
+        self.buffer.extend_from_slice(bytes);
+        push(&mut self.buffer_views, view)
+    }
+}
+
+/// A node of a document, to be placed.
+pub struct Node<'a>(&'a mut Value);
+
+impl Node<'_> {
+    /// Moves it to `translation`.
+    pub fn at(&mut self, translation: [f64; 3]) -> &mut Self {
+        self.0["translation"] = json!(translation);
+        self
+    }
+
+    /// Rotates it about the unit vector `axis`, before the translation.
+    pub fn rotated(&mut self, axis: [f64; 3], radians: f64) -> &mut Self {
+        let (sin, cos) = (0.5 * radians).sin_cos();
+        self.0["rotation"] = json!([axis[0] * sin, axis[1] * sin, axis[2] * sin, cos]);
+        self
+    }
+}
+
+/// Appends `value` and returns its index.
+fn push(list: &mut Vec<Value>, value: Value) -> usize {
+    list.push(value);
+    list.len() - 1
+}

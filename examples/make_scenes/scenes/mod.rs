@@ -1,0 +1,250 @@
+//! The project's own scenes. Units are metres, y is up; radiance is linear RGB.
+
+mod document;
+mod mesh;
+
+use document::{Document, File, clear, emitting, light, matte, mirror, one_sided};
+use glam::{DVec3, dvec3};
+use mesh::Mesh;
+
+/// Half the side of the rooms, which stand on the origin.
+const ROOM: f64 = 1.0;
+const WHITE: [f64; 3] = [0.73; 3];
+const BLACK: [f64; 3] = [0.0; 3];
+
+/// Every file of every scene.
+pub fn all() -> Vec<File> {
+    [
+        cornell(),
+        cornell_spheres(),
+        ring(),
+        pool("pool", false),
+        pool("pool-tiles", true),
+        furnace_diffuse(),
+        furnace_specular(),
+        furnace_closed(),
+        light_area(),
+        slab(),
+    ]
+    .into_iter()
+    .flat_map(Document::finish)
+    .collect()
+}
+
+/// The Cornell box after its fashion: matte walls, a square light, two blocks.
+fn cornell() -> Document {
+    let mut scene = cornell_room("cornell");
+    let white = scene.material(matte("box", WHITE));
+    let block = |height: f64| Mesh::cuboid(dvec3(-0.3, 0.0, -0.3), dvec3(0.3, height, 0.3));
+    // The gap keeps the blocks' lower sides off the floor.
+    let mut tall = scene.object("tall", &block(1.2), white);
+    tall.at([-0.35, 0.0005, -0.3])
+        .rotated([0.0, 1.0, 0.0], 18_f64.to_radians());
+    let mut short = scene.object("short", &block(0.6), white);
+    short
+        .at([0.33, 0.0005, 0.35])
+        .rotated([0.0, 1.0, 0.0], -17_f64.to_radians());
+    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
+    scene
+}
+
+/// The same room with a mirror and a glass sphere.
+fn cornell_spheres() -> Document {
+    let mut scene = cornell_room("cornell-spheres");
+    let mirror = scene.material(mirror("mirror", [0.95; 3]));
+    let glass = scene.material(clear("glass", 1.5));
+    let sphere = Mesh::icosphere(0.38, 4);
+    scene
+        .object("mirror-sphere", &sphere, mirror)
+        .at([-0.45, 0.3805, -0.35]);
+    scene.object("glass-sphere", &sphere, glass).at([0.42, 0.3805, 0.35]);
+    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
+    scene
+}
+
+/// A golden ring on a table, lit from the side: the cardioid caustic.
+fn ring() -> Document {
+    let mut scene = Document::new("ring");
+    let table = scene.material(matte("table", [0.75; 3]));
+    let gold = scene.material(mirror("gold", [1.0, 0.782, 0.344]));
+    let lamp = scene.material(light("light", [160.0, 150.0, 135.0]));
+    scene.object("table", &Mesh::facing_up(3.0, 0.0), table);
+    scene.object("ring", &Mesh::ring(0.46, 0.5, 0.002, 0.24, 256), gold);
+    scene.object("light", &Mesh::facing(dvec3(2.2, 1.9, -0.6), DVec3::ZERO, 0.12), lamp);
+    scene.camera([2.0, 1.35], [0.0, 0.0], 40.0);
+    scene
+}
+
+/// Wavy water over a floor, under a small light: caustics seen through the surface that made them.
+fn pool(name: &'static str, tiles: bool) -> Document {
+    const HEIGHT: f64 = 2.6;
+    let mut scene = Document::new(name);
+    let floor = if tiles {
+        scene.textured("tiles", &tile_png())
+    } else {
+        scene.material(matte("floor", [0.7; 3]))
+    };
+    let white = scene.material(matte("white", WHITE));
+    let lamp = scene.material(light("light", [170.0, 160.65, 142.12]));
+    let water = scene.material(clear("water", 1.33));
+    scene.object("floor", &Mesh::facing_up(ROOM, 0.0).tiled(8.0), floor);
+    for (name, wall) in walls(HEIGHT) {
+        scene.object(name, &wall, white);
+    }
+    scene.object("ceiling", &Mesh::facing_down(ROOM, HEIGHT), white);
+    scene.object("light", &Mesh::facing_down(0.08, HEIGHT - 0.002), lamp);
+    // The water reaches into the walls and the floor, so that no gap is left and no faces coincide.
+    let body = Mesh::body_of_liquid(ROOM + 0.03, -0.03, 96, waves);
+    scene.object("water", &body, water);
+    scene.camera([2.15, 0.93], [0.25, -0.25], 62.0);
+    scene
+}
+
+/// Height of the pool's water, and its derivatives in x and z.
+fn waves(x: f64, z: f64) -> [f64; 3] {
+    /// Amplitude, wave numbers in x and z, phase.
+    const WAVES: [[f64; 4]; 5] = [
+        [0.012, 10.2, 4.6, 0.3],
+        [0.0096, -7.4, 12.4, 1.1],
+        [0.0054, 16.6, -9.8, 2.7],
+        [0.0048, 4.4, 19.4, 4.0],
+        [0.00264, -22.6, -12.2, 0.9],
+    ];
+    WAVES
+        .iter()
+        .fold([0.7, 0.0, 0.0], |[y, slope_x, slope_z], [a, kx, kz, phase]| {
+            let (sin, cos) = (kx * x + kz * z + phase).sin_cos();
+            [y + a * sin, slope_x + a * kx * cos, slope_z + a * kz * cos]
+        })
+}
+
+/// One tile with half its joint, 8 × 8 texels.
+fn tile_png() -> Vec<u8> {
+    let texel = |x, y| {
+        image::Rgb(if x == 0 || y == 0 {
+            [235, 240, 240]
+        } else {
+            [150, 190, 200]
+        })
+    };
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbImage::from_fn(8, 8, texel)
+        .write_to(&mut png, image::ImageFormat::Png)
+        .expect("memory takes any PNG");
+    png.into_inner()
+}
+
+/// A grey sphere in a box of radiance 1.
+fn furnace_diffuse() -> Document {
+    let mut scene = furnace("furnace-diffuse");
+    let grey = scene.material(one_sided(matte("grey", [0.5; 3])));
+    scene.object("diffuse", &Mesh::icosphere(0.5, 4), grey);
+    scene.camera([0.0, 2.9], [0.0, 0.0], 60.0);
+    scene
+}
+
+/// A glass and a mirror sphere, neither of which absorbs, in a box of radiance 1.
+fn furnace_specular() -> Document {
+    let mut scene = furnace("furnace-specular");
+    let glass = scene.material(clear("glass", 1.5));
+    let mirror = scene.material(mirror("mirror", [1.0; 3]));
+    let sphere = Mesh::icosphere(0.5, 4);
+    scene.object("glass", &sphere, glass).at([-0.7, 0.0, 0.0]);
+    scene.object("mirror", &sphere, mirror).at([0.7, 0.0, 0.0]);
+    scene.camera([0.0, 2.9], [0.0, 0.0], 60.0);
+    scene
+}
+
+/// A closed matte room whose six sides emit Le and reflect ρ: radiance is Le / (1 − ρ) everywhere.
+fn furnace_closed() -> Document {
+    const ALBEDO: [f64; 3] = [0.2, 0.5, 0.8];
+    const EMISSION: [f64; 3] = [1.0, 0.5, 0.25];
+    let mut scene = Document::new("furnace-closed");
+    let wall = scene.material(emitting(matte("wall", ALBEDO), EMISSION));
+    scene.object("floor", &Mesh::facing_up(ROOM, 0.0), wall);
+    for (name, mesh) in walls(2.0) {
+        scene.object(name, &mesh, wall);
+    }
+    scene.object("ceiling", &Mesh::facing_down(ROOM, 2.0), wall);
+    scene.camera([1.0, 0.9], [1.0, 0.0], 90.0);
+    scene
+}
+
+/// A square light above a floor, for which irradiance has a closed form.
+fn light_area() -> Document {
+    let mut scene = Document::new("light-area");
+    let grey = scene.material(matte("grey", [0.5; 3]));
+    let lamp = scene.material(light("light", [10.0, 5.0, 2.5]));
+    scene.object("floor", &Mesh::facing_up(2.0, 0.0), grey);
+    scene.object("light", &Mesh::facing_down(0.5, 2.0), lamp);
+    scene.camera([1.8, 1.8], [0.0, 0.0], 40.0);
+    scene
+}
+
+/// A black room with a luminous ceiling and a grey floor, part of which lies under water.
+fn slab() -> Document {
+    const HEIGHT: f64 = 2.0;
+    let mut scene = Document::new("slab");
+    let grey = scene.material(matte("grey", [0.5; 3]));
+    let black = scene.material(matte("black", BLACK));
+    let lamp = scene.material(light("light", [1.0; 3]));
+    let water = scene.material(clear("water", 1.33));
+    scene.object("floor", &Mesh::facing_up(ROOM, 0.0), grey);
+    for (name, wall) in walls(HEIGHT) {
+        scene.object(name, &wall, black);
+    }
+    scene.object("ceiling", &Mesh::facing_down(ROOM, HEIGHT), lamp);
+    let reach = ROOM + 0.03;
+    let body = Mesh::cuboid(dvec3(-0.5, -0.03, -reach), dvec3(reach, 0.4, reach));
+    scene.object("water", &body, water);
+    scene.camera([1.7, 0.6], [0.2, 0.0], 60.0);
+    scene
+}
+
+/// The Cornell box without what stands in it.
+fn cornell_room(name: &'static str) -> Document {
+    const HEIGHT: f64 = 2.0;
+    let mut scene = Document::new(name);
+    let white = scene.material(matte("white", WHITE));
+    let red = scene.material(matte("red", [0.63, 0.065, 0.05]));
+    let green = scene.material(matte("green", [0.14, 0.45, 0.091]));
+    let lamp = scene.material(light("light", [17.0, 14.45, 11.05]));
+    scene.object("floor", &Mesh::facing_up(ROOM, 0.0), white);
+    scene.object("ceiling", &Mesh::facing_down(ROOM, HEIGHT), white);
+    let [back, left, right, _] = walls(HEIGHT);
+    for ((name, wall), material) in [(back, white), (left, red), (right, green)] {
+        scene.object(name, &wall, material);
+    }
+    scene.object("light", &Mesh::facing_down(0.25, HEIGHT - 0.002), lamp);
+    scene
+}
+
+/// A box of 6 m with walls of radiance 1 that reflect nothing.
+fn furnace(name: &'static str) -> Document {
+    let mut scene = Document::new(name);
+    let environment = scene.material(light("env", [1.0; 3]));
+    let walls = Mesh::cuboid(DVec3::splat(-3.0), DVec3::splat(3.0)).flipped();
+    scene.object("env", &walls, environment);
+    scene
+}
+
+/// The walls of a room, facing inward, with their names: back, left, right, front.
+fn walls(height: f64) -> [(&'static str, Mesh); 4] {
+    // From the lower left corner to the lower right one, seen from inside.
+    [
+        ("back", [-1.0, -1.0], [1.0, -1.0]),
+        ("left", [-1.0, 1.0], [-1.0, -1.0]),
+        ("right", [1.0, -1.0], [1.0, 1.0]),
+        ("front", [1.0, 1.0], [-1.0, 1.0]),
+    ]
+    .map(|(name, left, right)| {
+        let corner = |[x, z]: [f64; 2], y| dvec3(ROOM * x, y, ROOM * z);
+        let quad = [
+            corner(left, 0.0),
+            corner(right, 0.0),
+            corner(right, height),
+            corner(left, height),
+        ];
+        (name, Mesh::quad(quad))
+    })
+}
