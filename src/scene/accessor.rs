@@ -101,18 +101,17 @@ impl<'a> Elements<'a> {
                 return Err(fail(damaged(what)));
             }
         };
-        if accessor.buffer_view.is_none() {
+        let Some(view) = accessor.buffer_view else {
             let what = "it has no bufferView; if an extension compresses its data, export without compression";
             return Err(fail(what.into()));
-        }
+        };
         let size = shape.multiplicity() * component.size();
-        let elements = Self::locate(document, accessor, size).map_err(|what| fail(damaged(what)))?;
+        let elements = Self::locate(document, accessor, view.value(), size).map_err(|what| fail(damaged(what)))?;
         Ok((elements, component))
     }
 
-    /// Finds the bytes of an accessor whose elements have `size` bytes.
-    fn locate(document: &'a Document, accessor: &Accessor, size: usize) -> Check<Self> {
-        let view_index = accessor.buffer_view.ok_or("it has no bufferView")?.value();
+    /// Finds the bytes of an accessor into the view at `view_index`, whose elements have `size` bytes.
+    fn locate(document: &'a Document, accessor: &Accessor, view_index: usize, size: usize) -> Check<Self> {
         let views = &document.root.buffer_views;
         let view = views
             .get(view_index)

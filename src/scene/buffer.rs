@@ -47,7 +47,7 @@ pub(super) fn read_all(root: &Root, folder: &Path, binary: Option<Vec<u8>>) -> C
 
 fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8>> {
     let length = buffer.byte_length.0;
-    let (bytes, source) = match &buffer.uri {
+    let (mut bytes, source) = match &buffer.uri {
         None => (
             binary.ok_or_else(|| damaged("it has no uri, and the file no binary chunk for it"))?,
             "the binary chunk".to_owned(),
@@ -66,6 +66,8 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8
             bytes.len()
         )));
     }
+    // What follows is padding.
+    bytes.truncate(length as usize);
     Ok(bytes)
 }
 

@@ -35,7 +35,7 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    /// Of an empty scene.
+    /// A builder that has no objects yet.
     pub(super) fn new(normalisation: Normalisation) -> Self {
         Self {
             geometry: Geometry {

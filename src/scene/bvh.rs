@@ -12,7 +12,7 @@ use obvhs::triangle::Triangle;
 use crate::layout::BvhNode;
 
 /// Entries of the traversal's stack in `glsl/shared/intersect.glsl`.
-const STACK_SIZE: usize = 48;
+const STACK_SIZE: usize = 64;
 
 /// A hierarchy over triangles.
 #[derive(Debug, Clone)]

@@ -86,13 +86,15 @@ fn place(
     normalisation: Normalisation,
 ) -> Check<Option<Camera>> {
     let fov = f64::from(perspective.yfov);
-    if !(fov > 0.0 && fov < PI) {
+    let tan_half_fov = (0.5 * fov).tan() as f32;
+    // An angle near zero has a tangent that f32 can't hold.
+    if !(fov > 0.0 && fov < PI && tan_half_fov.is_normal()) {
         return Err(format!(
             "its yfov is {fov}, but it must lie between 0 and π; correct it in the file"
         ));
     }
     if let Some(aspect) = perspective.aspect_ratio
-        && !(aspect > 0.0 && aspect.is_finite())
+        && !(aspect > 0.0 && aspect.is_normal())
     {
         return Err(format!(
             "its aspectRatio is {aspect}, but it must be positive; correct it in the file"
@@ -113,7 +115,7 @@ fn place(
         right,
         up,
         forward,
-        tan_half_fov: (0.5 * fov).tan() as f32,
+        tan_half_fov,
         aspect: perspective.aspect_ratio,
     }))
 }

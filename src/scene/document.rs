@@ -29,7 +29,7 @@ const MAX_FILE_SIZE: u64 = u32::MAX as u64;
 pub(super) struct Document {
     /// The JSON.
     pub root: Root,
-    /// One byte string per `root.buffers`, at least as long as its `byteLength`.
+    /// One byte string per `root.buffers`, as long as its `byteLength`.
     pub buffers: Vec<Vec<u8>>,
 }
 

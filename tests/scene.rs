@@ -1,0 +1,20 @@
+//! The scene loader: what it makes of good files, and that every bad one gives one clear line.
+
+#[path = "scene/cameras.rs"]
+mod cameras;
+#[path = "scene/damaged.rs"]
+mod damaged;
+#[path = "scene/files.rs"]
+mod files;
+#[path = "scene/fixture.rs"]
+mod fixture;
+#[path = "scene/geometry.rs"]
+mod geometry;
+#[path = "scene/hierarchy.rs"]
+mod hierarchy;
+#[path = "scene/lights.rs"]
+mod lights;
+#[path = "scene/materials.rs"]
+mod materials;
+#[path = "scene/mutation.rs"]
+mod mutation;

@@ -1,0 +1,207 @@
+//! Accessors, indices and vertices that are not what they say.
+
+use serde_json::{Value, json};
+
+use crate::fixture::Fixture;
+
+/// Checks what changing one value of the room makes loading say.
+#[track_caller]
+fn assert_change_fails(pointer: &str, value: Value, parts: &[&str]) {
+    let mut room = Fixture::room();
+    room.set(pointer, value);
+    room.assert_fails(parts);
+}
+
+#[test]
+fn accessors_out_of_bounds_are_named() {
+    let position = ["mesh 0 \"floor\", primitive 0", "POSITION", "accessor 0"];
+    let with = |part| [position.as_slice(), &[part]].concat();
+    assert_change_fails("/accessors/0/count", json!(5), &with("5 elements"));
+    assert_change_fails("/accessors/0/byteOffset", json!(4), &with("4 elements from byte 4"));
+    assert_change_fails(
+        "/bufferViews/0/byteLength",
+        json!(47),
+        &with("bufferView 0, which has 47"),
+    );
+    assert_change_fails("/bufferViews/0/byteLength", json!(1_000_000), &with("which has 144"));
+    assert_change_fails(
+        "/bufferViews/0/byteOffset",
+        json!(143),
+        &with("from byte 143 of buffer 0"),
+    );
+    assert_change_fails("/bufferViews/0/byteStride", json!(20), &with("4 elements"));
+    assert_change_fails(
+        "/bufferViews/0/byteStride",
+        json!(8),
+        &with("stride of 8 bytes for elements of 12"),
+    );
+    assert_change_fails("/accessors/2/count", json!(7), &["indices", "accessor 2", "7 elements"]);
+    assert_change_fails("/accessors/1/byteOffset", json!(1), &["NORMAL", "accessor 1"]);
+}
+
+#[test]
+fn counts_and_offsets_that_overflow_are_refused_without_allocating() {
+    for huge in [json!(4_000_000_000u64), json!(u64::MAX), json!(u64::MAX / 12 + 1)] {
+        assert_change_fails("/accessors/0/count", huge.clone(), &["accessor 0", "elements"]);
+        assert_change_fails("/accessors/2/count", huge.clone(), &["accessor 2", "elements"]);
+        assert_change_fails("/accessors/0/byteOffset", huge.clone(), &["accessor 0"]);
+        assert_change_fails("/bufferViews/0/byteOffset", huge.clone(), &["accessor 0"]);
+        assert_change_fails("/bufferViews/0/byteLength", huge.clone(), &["accessor 0"]);
+        assert_change_fails("/bufferViews/0/byteStride", huge, &["accessor 0"]);
+    }
+    assert_change_fails("/accessors/0/count", json!(-1), &["isn't glTF 2.0", "line"]);
+    assert_change_fails("/accessors/0/count", json!(1.5), &["isn't glTF 2.0", "line"]);
+}
+
+#[test]
+fn indices_of_accessors_views_buffers_and_materials_out_of_range_are_named() {
+    let mesh = "mesh 0 \"floor\", primitive 0";
+    assert_change_fails(
+        "/meshes/0/primitives/0/attributes/POSITION",
+        json!(99),
+        &[mesh, "POSITION", "no accessor 99", "has 4"],
+    );
+    assert_change_fails(
+        "/meshes/0/primitives/0/attributes/NORMAL",
+        json!(99),
+        &[mesh, "NORMAL", "no accessor 99"],
+    );
+    assert_change_fails(
+        "/meshes/0/primitives/0/indices",
+        json!(99),
+        &[mesh, "indices", "no accessor 99"],
+    );
+    assert_change_fails(
+        "/accessors/0/bufferView",
+        json!(99),
+        &[mesh, "no bufferView 99", "has 4"],
+    );
+    assert_change_fails("/bufferViews/0/buffer", json!(99), &[mesh, "no buffer 99", "has 1"]);
+    assert_change_fails(
+        "/meshes/0/primitives/0/material",
+        json!(99),
+        &[mesh, "no material 99", "has 2"],
+    );
+    assert_change_fails("/meshes/0/primitives/0/mode", json!(99), &[mesh, "mode"]);
+}
+
+#[test]
+fn accessors_of_the_wrong_type_are_named() {
+    assert_change_fails(
+        "/accessors/0/type",
+        json!("VEC2"),
+        &["POSITION, accessor 0", "Vec2", "Vec3"],
+    );
+    assert_change_fails("/accessors/0/type", json!("VEC9"), &["POSITION, accessor 0", "Vec3"]);
+    assert_change_fails(
+        "/accessors/0/componentType",
+        json!(5123),
+        &["POSITION, accessor 0", "U16", "F32"],
+    );
+    assert_change_fails("/accessors/0/componentType", json!(1), &["POSITION, accessor 0", "F32"]);
+    assert_change_fails(
+        "/accessors/1/componentType",
+        json!(5120),
+        &["NORMAL, accessor 1", "I8", "F32"],
+    );
+    assert_change_fails("/accessors/1/type", json!("SCALAR"), &["NORMAL, accessor 1", "Scalar"]);
+    assert_change_fails(
+        "/accessors/2/componentType",
+        json!(5126),
+        &["indices, accessor 2", "F32", "U16"],
+    );
+    assert_change_fails(
+        "/accessors/2/componentType",
+        json!(5122),
+        &["indices, accessor 2", "I16"],
+    );
+    assert_change_fails(
+        "/accessors/2/type",
+        json!("VEC2"),
+        &["indices, accessor 2", "Vec2", "Scalar"],
+    );
+}
+
+#[test]
+fn accessors_without_plain_data_are_refused() {
+    let sparse = json!({
+        "count": 1,
+        "indices": {"bufferView": 2, "componentType": 5123},
+        "values": {"bufferView": 0}
+    });
+    assert_change_fails(
+        "/accessors/0/sparse",
+        sparse,
+        &["accessor 0", "sparse", "aren't supported yet"],
+    );
+    let mut room = Fixture::room();
+    room.remove("/accessors/0/bufferView");
+    room.assert_fails(&["accessor 0", "no bufferView"]);
+}
+
+#[test]
+fn normals_and_positions_of_different_number_are_refused() {
+    let mut room = Fixture::room();
+    let normals = room.add_vectors(&[[0.0, 1.0, 0.0]; 5]);
+    room.set("/meshes/0/primitives/0/attributes/NORMAL", json!(normals));
+    room.assert_fails(&["mesh 0 \"floor\", primitive 0", "5 normals for 4 positions"]);
+}
+
+#[test]
+fn an_index_past_the_vertices_is_named() {
+    let mut room = Fixture::room();
+    let indices = room.add_indices(&[0, 1, 2, 0, 2, 4]);
+    room.set("/meshes/0/primitives/0/indices", json!(indices));
+    room.assert_fails(&["mesh 0 \"floor\", primitive 0", "index 5 is vertex 4", "4 vertices"]);
+    let indices = room.add_accessor(&[0xff; 12], 3, 5125, "SCALAR");
+    room.set("/meshes/0/primitives/0/indices", json!(indices));
+    room.assert_fails(&["index 0 is vertex 4294967295"]);
+}
+
+#[test]
+fn vertices_that_are_not_finite_are_named() {
+    for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut room = Fixture::room();
+        room.poke(0, 7, value);
+        room.assert_fails(&["mesh 0 \"floor\", primitive 0", "position of vertex 2 isn't finite"]);
+        let mut room = Fixture::room();
+        room.poke(1, 5, value);
+        room.assert_fails(&["mesh 0 \"floor\", primitive 0", "normal of vertex 1 isn't finite"]);
+    }
+}
+
+#[test]
+fn primitives_without_vertices_are_skipped() {
+    let mut room = Fixture::room();
+    for accessor in 0..3 {
+        room.set(&format!("/accessors/{accessor}/count"), json!(0));
+    }
+    assert_eq!(room.scene().objects.len(), 1, "the lamp");
+}
+
+#[test]
+fn json_of_another_structure_is_refused() {
+    let values = [
+        json!(null),
+        json!(7),
+        json!("text"),
+        json!([]),
+        json!([null]),
+        json!({"a": 1}),
+    ];
+    for key in [
+        "accessors",
+        "buffers",
+        "cameras",
+        "materials",
+        "meshes",
+        "nodes",
+        "scenes",
+    ] {
+        for value in &values {
+            let mut room = Fixture::room();
+            room.set(&format!("/{key}"), value.clone());
+            room.assert_fails(&[]);
+        }
+    }
+}

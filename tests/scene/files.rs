@@ -1,0 +1,227 @@
+//! The ways in which a scene may be spread over files.
+
+use std::fs;
+use std::path::Path;
+
+use ppm_vk::scene::Scene;
+use serde_json::json;
+
+use crate::fixture::{Fixture, assert_error};
+
+#[test]
+fn external_embedded_and_binary_buffers_give_the_same_scene() {
+    let mut room = Fixture::room();
+    let external = room.scene();
+    let binary = room.load_bytes("room.glb", &room.glb()).expect("the .glb loads");
+    let embedded = room.load_embedded().expect("the data URI loads");
+    for (scene, name) in [(&binary, "room"), (&embedded, "embedded")] {
+        assert_eq!(scene.positions, external.positions);
+        assert_eq!(scene.triangles, external.triangles);
+        assert_eq!(scene.name, name, "the scene is named after its file");
+    }
+    assert_eq!(external.triangles.len(), 3);
+    assert!(external.warnings.is_empty(), "{:?}", external.warnings);
+}
+
+#[test]
+fn base64_may_lack_its_padding() {
+    let mut room = Fixture::room();
+    while room.binary.len().is_multiple_of(3) {
+        room.binary.push(0);
+    }
+    room.load_embedded().expect("padded base64 loads");
+    let uri = room.json["buffers"][0]["uri"].as_str().expect("a URI").to_owned();
+    assert!(uri.ends_with('='), "the test needs padding to remove");
+    room.set("/buffers/0/uri", json!(uri.trim_end_matches('=')));
+    room.load().expect("base64 without padding loads");
+}
+
+#[test]
+fn buffer_uris_are_percent_decoded_and_may_lead_into_folders() {
+    let mut room = Fixture::room();
+    fs::create_dir(room.path("my data")).expect("a folder");
+    room.write("my data/50% ä.bin", &room.binary);
+    room.set("/buffers/0/uri", json!("./my%20data/50% %C3%A4.bin"));
+    room.scene();
+}
+
+#[test]
+fn buffer_uris_that_lead_elsewhere_are_refused() {
+    let uris = [
+        ("http://example.org/room.bin", "\"http\""),
+        ("file:///tmp/room.bin", "\"file\""),
+        ("/tmp/room.bin", "leads out"),
+        ("../room.bin", "leads out"),
+        ("%2e%2e/room.bin", "leads out"),
+        ("a/../../room.bin", "leads out"),
+        ("room%00.bin", "isn't a valid file name"),
+        ("%ff.bin", "isn't a valid file name"),
+    ];
+    for (uri, part) in uris {
+        let mut room = Fixture::room();
+        room.set("/buffers/0/uri", json!(uri));
+        room.assert_fails(&["buffer 0", part]);
+    }
+}
+
+#[test]
+fn bad_data_uris_are_named() {
+    let uris = [
+        ("data:application/octet-stream;base64", "no comma"),
+        ("data:application/octet-stream,abc", "isn't base64"),
+        ("data:;base64,@@@@", "isn't valid base64"),
+        ("data:;base64,AAAA", "has 3 bytes"),
+    ];
+    for (uri, part) in uris {
+        let mut room = Fixture::room();
+        room.set("/buffers/0/uri", json!(uri));
+        room.assert_fails(&["buffer 0", part]);
+    }
+}
+
+#[test]
+fn a_missing_or_short_buffer_is_named() {
+    let mut room = Fixture::room();
+    room.set("/buffers/0/name", json!("data"));
+    room.set("/buffers/0/uri", json!("absent.bin"));
+    room.assert_fails(&["buffer 0 \"data\"", "absent.bin", "can't be read"]);
+
+    room.set("/buffers/0/uri", json!("."));
+    room.assert_fails(&["buffer 0", "isn't a file"]);
+
+    let mut room = Fixture::room();
+    room.binary.truncate(10);
+    room.assert_fails(&["buffer 0", "room.bin", "has 10 bytes"]);
+
+    let mut room = Fixture::room();
+    room.remove("/buffers/0/uri");
+    room.assert_fails(&["buffer 0", "no uri"]);
+}
+
+#[test]
+fn buffers_of_absurd_size_are_refused_before_they_are_read() {
+    let mut room = Fixture::room();
+    room.set("/buffers/0/byteLength", json!(1u64 << 60));
+    room.assert_fails(&["1152921504606846976 bytes"]);
+}
+
+#[test]
+fn a_path_that_is_no_scene_file_is_named() {
+    let room = Fixture::room();
+    assert_error(
+        Scene::load(&room.path("absent.gltf")),
+        &["can't be read", "check the path"],
+    );
+    assert_error(Scene::load(room.folder.path()), &["isn't a file"]);
+    assert_error(room.load_bytes("empty.gltf", b""), &["is empty"]);
+    assert_error(
+        room.load_bytes("picture.gltf", b"\x89PNG\r\n\x1a\n"),
+        &["isn't glTF", "JSON"],
+    );
+    assert_error(
+        room.load_bytes("cut.gltf", b"{\"asset\": {\"version\""),
+        &["isn't glTF"],
+    );
+    assert_error(room.load_bytes("list.gltf", b"[1, 2]"), &["isn't glTF 2.0"]);
+    assert_error(room.load_bytes("bare.gltf", b"{}"), &["asset.version"]);
+    let nested = "[".repeat(1_000_000);
+    assert_error(room.load_bytes("nested.gltf", nested.as_bytes()), &["isn't glTF"]);
+}
+
+#[test]
+fn a_byte_order_mark_is_skipped() {
+    let room = Fixture::room();
+    room.scene();
+    let marked = format!("\u{feff}{}", room.json);
+    room.load_bytes("marked.gltf", marked.as_bytes()).expect("it loads");
+}
+
+#[test]
+fn other_versions_are_refused() {
+    let mut room = Fixture::room();
+    room.set("/asset/version", json!("1.0"));
+    room.assert_fails(&["glTF \"1.0\"", "only 2.0"]);
+    room.set("/asset", json!({"version": "2.1", "minVersion": "2.1"}));
+    room.assert_fails(&["glTF \"2.1\""]);
+    room.set("/asset", json!({"version": "2.1", "minVersion": "2.0"}));
+    room.scene();
+}
+
+#[test]
+fn a_glb_cut_anywhere_is_refused() {
+    let room = Fixture::room();
+    let glb = room.glb();
+    for length in 4..glb.len() {
+        assert_error(room.load_bytes("cut.glb", &glb[..length]), &["truncated .glb"]);
+    }
+}
+
+#[test]
+fn wrong_lengths_in_a_glb_are_refused() {
+    let room = Fixture::room();
+    let with_word = |at: usize, word: u32| {
+        let mut glb = room.glb();
+        glb[at..at + 4].copy_from_slice(&word.to_le_bytes());
+        room.load_bytes("changed.glb", &glb)
+    };
+    let length = room.glb().len() as u32;
+    let json_length = length - 28 - room.binary.len().next_multiple_of(4) as u32;
+    assert_error(with_word(4, 1), &[".glb version 1"]);
+    assert_error(with_word(8, 0), &["no room for a chunk's header"]);
+    assert_error(with_word(8, 16), &["no room for a chunk's header"]);
+    assert_error(with_word(8, length + 1), &["truncated .glb"]);
+    assert_error(with_word(8, length - 8), &["damaged .glb"]);
+    assert_error(with_word(8, u32::MAX), &["truncated .glb"]);
+    assert_error(with_word(12, u32::MAX), &["damaged .glb", "are left"]);
+    assert_error(with_word(12, 8), &["damaged .glb"]);
+    assert_error(with_word(16, 0), &["first chunk isn't JSON"]);
+    assert_error(with_word(20 + json_length as usize, u32::MAX), &["damaged .glb"]);
+    // A binary chunk of another type counts as none.
+    assert_error(
+        with_word(24 + json_length as usize, 0),
+        &["buffer 0", "no binary chunk"],
+    );
+}
+
+#[test]
+fn further_chunks_of_a_glb_are_skipped() {
+    let room = Fixture::room();
+    let mut glb = room.glb();
+    glb.extend_from_slice(b"\x04\0\0\0MOREdata");
+    let length = (glb.len() as u32).to_le_bytes();
+    glb[8..12].copy_from_slice(&length);
+    room.load_bytes("more.glb", &glb).expect("it loads");
+}
+
+#[test]
+fn names_with_line_ends_and_megabytes_keep_messages_to_a_line() {
+    let mut room = Fixture::room();
+    room.set("/nodes/0/name", json!(format!("two\nlines{}", "x".repeat(1 << 20))));
+    room.set("/nodes/0/mesh", json!(9));
+    room.assert_fails(&["node 0 \"two\\nlinesxxx", "no mesh 9"]);
+    room.set("/nodes/0/mesh", json!(0));
+    assert!(room.scene().objects[0].name.len() < 200, "names are cut");
+}
+
+/// Where the project's shared scenes lie beside the checkout, all must load or say why not.
+#[test]
+fn the_shared_scenes_load() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
+    let Ok(entries) = fs::read_dir(folder) else {
+        return;
+    };
+    for entry in entries {
+        let path = entry.expect("an entry").path();
+        if path.extension().is_none_or(|extension| extension != "gltf") {
+            continue;
+        }
+        let text = fs::read_to_string(&path).expect("a scene");
+        match Scene::load(&path) {
+            Ok(scene) => assert!(!scene.triangles.is_empty() && !scene.emissive_triangles().is_empty()),
+            Err(error) => assert!(
+                text.contains("KHR_lights_punctual") && error.to_string().contains("no light"),
+                "{error}"
+            ),
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! Materials: what is supported, what is named in a warning, and what is refused.
+
+use ppm_vk::scene::{Material, Surface};
+use serde_json::{Value, json};
+
+use crate::fixture::{Fixture, assert_close};
+
+/// The room whose floor has the given material.
+fn floor_of(material: Value) -> Fixture {
+    let mut room = Fixture::room();
+    room.set("/materials/0", material);
+    room.set("/materials/0/name", json!("floor"));
+    room
+}
+
+/// A material without specular lobe, with more fields.
+fn matte(fields: Value) -> Value {
+    let mut material = json!({
+        "pbrMetallicRoughness": {"metallicFactor": 0},
+        "extensions": {"KHR_materials_specular": {"specularFactor": 0}}
+    });
+    for (key, value) in fields.as_object().expect("an object") {
+        material[key] = value.clone();
+    }
+    material
+}
+
+/// Clear glass, with more extensions.
+fn glass(extensions: Value) -> Value {
+    let mut material = json!({
+        "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+        "extensions": {
+            "KHR_materials_transmission": {"transmissionFactor": 1},
+            "KHR_materials_volume": {"thicknessFactor": 1}
+        }
+    });
+    for (key, value) in extensions.as_object().expect("an object") {
+        material["extensions"][key] = value.clone();
+    }
+    material
+}
+
+/// The floor's material as it is loaded, without any warning.
+#[track_caller]
+fn loaded(material: Value) -> Material {
+    let mut scene = floor_of(material).scene();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    scene.materials.remove(0)
+}
+
+#[test]
+fn the_base_colour_is_the_albedo_of_a_matte_surface() {
+    let pbr = json!({"metallicFactor": 0, "baseColorFactor": [0.25, 0.5, 0.75, 1]});
+    let material = loaded(matte(json!({"pbrMetallicRoughness": pbr, "doubleSided": true})));
+    assert_eq!(material.surface, Surface::Matte);
+    assert_eq!(material.base_color.to_array(), [0.25, 0.5, 0.75]);
+    assert_eq!(material.emission.to_array(), [0.0; 3]);
+    assert_eq!(material.name, "floor");
+    assert!(material.double_sided);
+}
+
+#[test]
+fn metallic_1_with_roughness_0_is_a_mirror() {
+    let pbr = json!({"metallicFactor": 1, "roughnessFactor": 0, "baseColorFactor": [1, 0.75, 0.25, 1]});
+    let material = loaded(json!({"pbrMetallicRoughness": pbr}));
+    assert_eq!(material.surface, Surface::Mirror);
+    assert_eq!(material.base_color.to_array(), [1.0, 0.75, 0.25]);
+    assert!(!material.double_sided);
+}
+
+#[test]
+fn transmission_is_a_dielectric_with_the_files_index_or_1_5() {
+    assert_eq!(loaded(glass(json!({}))).surface, Surface::Dielectric { ior: 1.5 });
+    let water = glass(json!({"KHR_materials_ior": {"ior": 1.33}}));
+    assert_eq!(loaded(water).surface, Surface::Dielectric { ior: 1.33 });
+    let nothing = glass(json!({"KHR_materials_ior": {"ior": 1}}));
+    assert_eq!(loaded(nothing).surface, Surface::Dielectric { ior: 1.0 });
+    let none = matte(json!({"extensions": {
+        "KHR_materials_transmission": {"transmissionFactor": 0}, "KHR_materials_specular": {"specularFactor": 0}
+    }}));
+    assert_eq!(loaded(none).surface, Surface::Matte);
+}
+
+#[test]
+fn emission_is_factor_times_strength() {
+    let mut material = matte(json!({"emissiveFactor": [1, 0.5, 3]}));
+    assert_close(loaded(material.clone()).emission, [1.0, 0.5, 3.0]);
+    material["extensions"]["KHR_materials_emissive_strength"] = json!({"emissiveStrength": 4});
+    assert_close(loaded(material).emission, [4.0, 2.0, 12.0]);
+}
+
+#[test]
+fn unnamed_materials_are_numbered_and_the_default_material_is_appended() {
+    let mut room = Fixture::room();
+    room.remove("/materials/0/name");
+    let scene = room.scene();
+    assert_eq!(scene.materials[0].name, "material 0");
+    assert_eq!(scene.materials.len(), 2);
+
+    room.remove("/meshes/0/primitives/0/material");
+    let scene = room.assert_warns(&["material 2 \"default\"", "metallic with roughness 1"]);
+    assert_eq!(scene.objects[0].material, 2);
+    assert_eq!(scene.materials[2].base_color.to_array(), [1.0; 3]);
+}
+
+#[test]
+fn factors_above_1_are_cut_with_a_warning() {
+    let pbr = json!({"metallicFactor": 0, "baseColorFactor": [0.5, 1.5, 2, 1]});
+    let scene = floor_of(matte(json!({"pbrMetallicRoughness": pbr}))).assert_warns(&[
+        "material 0 \"floor\"",
+        "baseColorFactor 0.5 1.5 2",
+        "above 1",
+    ]);
+    assert_eq!(scene.materials[0].base_color.to_array(), [0.5, 1.0, 1.0]);
+    let pbr = json!({"metallicFactor": 2, "roughnessFactor": 0});
+    floor_of(json!({"pbrMetallicRoughness": pbr})).assert_warns(&["metallicFactor 2 is above 1"]);
+}
+
+#[test]
+fn negative_and_infinite_factors_are_refused() {
+    let pbr = |key: &str, value: Value| matte(json!({"pbrMetallicRoughness": {key: value}}));
+    let extension = |name: &str, key: &str, value: Value| glass(json!({name: {key: value}}));
+    let cases = [
+        (
+            pbr("baseColorFactor", json!([0, -0.5, 0, 1])),
+            "baseColorFactor is 0 -0.5 0",
+        ),
+        (pbr("baseColorFactor", json!([1e39, 0, 0, 1])), "baseColorFactor is inf"),
+        (pbr("metallicFactor", json!(-1)), "metallicFactor is -1"),
+        (pbr("roughnessFactor", json!(-1)), "roughnessFactor is -1"),
+        (matte(json!({"emissiveFactor": [0, 0, -1]})), "emissiveFactor is 0 0 -1"),
+        (matte(json!({"emissiveFactor": [1e39, 0, 0]})), "emissiveFactor is inf"),
+        (
+            extension("KHR_materials_emissive_strength", "emissiveStrength", json!(-2)),
+            "emissiveStrength is -2",
+        ),
+        (
+            extension("KHR_materials_transmission", "transmissionFactor", json!(-1)),
+            "transmissionFactor is -1",
+        ),
+        (
+            extension("KHR_materials_ior", "ior", json!(-1)),
+            "index of refraction is -1",
+        ),
+        (
+            extension("KHR_materials_ior", "ior", json!(0.5)),
+            "index of refraction is 0.5",
+        ),
+        (
+            extension("KHR_materials_ior", "ior", json!(1e30)),
+            "index of refraction",
+        ),
+        (
+            extension("KHR_materials_specular", "specularFactor", json!(-1)),
+            "specularFactor is -1",
+        ),
+        (
+            extension("KHR_materials_specular", "specularColorFactor", json!([1, 1, -1])),
+            "specularColorFactor is 1 1 -1",
+        ),
+        (
+            extension("KHR_materials_volume", "thicknessFactor", json!(-1)),
+            "thicknessFactor is -1",
+        ),
+        (
+            extension("KHR_materials_volume", "attenuationColor", json!([-1, 1, 1])),
+            "attenuationColor is -1 1 1",
+        ),
+        (
+            extension("KHR_materials_volume", "attenuationDistance", json!(0)),
+            "attenuationDistance is 0",
+        ),
+    ];
+    for (material, part) in cases {
+        floor_of(material).assert_fails(&["material 0 \"floor\"", part, "correct it"]);
+    }
+    let mut bright = matte(json!({"emissiveFactor": [3e38, 0, 0]}));
+    bright["extensions"]["KHR_materials_emissive_strength"] = json!({"emissiveStrength": 10});
+    floor_of(bright).assert_fails(&["material 0", "emissiveFactor times emissiveStrength"]);
+}
+
+#[test]
+fn what_is_rendered_otherwise_is_named_in_a_warning() {
+    let rough_metal = json!({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0.25}});
+    let half_metal = matte(json!({"pbrMetallicRoughness": {"metallicFactor": 0.5}}));
+    let mut frosted = glass(json!({}));
+    frosted["pbrMetallicRoughness"]["roughnessFactor"] = json!(0.5);
+    let mut metal_glass = glass(json!({}));
+    metal_glass["pbrMetallicRoughness"]["metallicFactor"] = json!(1);
+    let thin = json!({
+        "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}
+    });
+    let absorbing = json!({"thicknessFactor": 1, "attenuationColor": [1, 0.5, 1], "attenuationDistance": 2});
+    let cases: [(Value, &[&str], Surface); 12] = [
+        (rough_metal, &["metallic with roughness 0.25", "matte"], Surface::Matte),
+        (half_metal, &["metallicFactor 0.5", "matte"], Surface::Matte),
+        (frosted, &["roughness 0.5", "smooth"], Surface::Dielectric { ior: 1.5 }),
+        (metal_glass, &["metallicFactor 1", "transmission"], Surface::Mirror),
+        (thin, &["thin wall", "solid"], Surface::Dielectric { ior: 1.5 }),
+        (
+            glass(json!({"KHR_materials_volume": {"thicknessFactor": 0}})),
+            &["thin wall"],
+            Surface::Dielectric { ior: 1.5 },
+        ),
+        (
+            glass(json!({"KHR_materials_volume": absorbing})),
+            &["attenuationColor"],
+            Surface::Dielectric { ior: 1.5 },
+        ),
+        (
+            glass(json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}})),
+            &["transmissionFactor 0.5", "clear glass"],
+            Surface::Dielectric { ior: 1.5 },
+        ),
+        (
+            glass(json!({"KHR_materials_specular": {"specularFactor": 0.5}})),
+            &["KHR_materials_specular", "ior alone"],
+            Surface::Dielectric { ior: 1.5 },
+        ),
+        (
+            glass(json!({"KHR_materials_ior": {"ior": 0}})),
+            &["index of refraction of 0", "1.5 is used"],
+            Surface::Dielectric { ior: 1.5 },
+        ),
+        (
+            matte(json!({"alphaMode": "MASK"})),
+            &["alphaMode Mask", "opaque"],
+            Surface::Matte,
+        ),
+        (
+            matte(json!({"alphaMode": "BLEND"})),
+            &["alphaMode Blend", "opaque"],
+            Surface::Matte,
+        ),
+    ];
+    for (material, parts, surface) in cases {
+        let parts = [&["material 0 \"floor\""], parts].concat();
+        let scene = floor_of(material).assert_warns(&parts);
+        assert_eq!(scene.materials[0].surface, surface, "{parts:?}");
+    }
+}
+
+#[test]
+fn absorption_that_absorbs_nothing_is_no_reason_to_warn() {
+    let volume = json!({"thicknessFactor": 1, "attenuationColor": [1, 0.5, 1]});
+    loaded(glass(json!({"KHR_materials_volume": volume})));
+    let volume = json!({"thicknessFactor": 1, "attenuationDistance": 2});
+    loaded(glass(json!({"KHR_materials_volume": volume})));
+}
+
+#[test]
+fn textures_of_any_slot_are_named_in_one_warning() {
+    let texture = json!({"index": 0});
+    let mut textured = matte(json!({
+        "normalTexture": texture, "occlusionTexture": texture, "emissiveTexture": texture
+    }));
+    textured["pbrMetallicRoughness"]["baseColorTexture"] = texture.clone();
+    textured["pbrMetallicRoughness"]["metallicRoughnessTexture"] = texture.clone();
+    textured["extensions"]["KHR_materials_transmission"] = json!({"transmissionTexture": texture});
+    textured["extensions"]["KHR_materials_specular"] = json!({
+        "specularFactor": 0, "specularTexture": texture, "specularColorTexture": texture
+    });
+    let mut room = floor_of(textured);
+    room.set("/textures", json!([{"source": 0}]));
+    room.set("/images", json!([{"uri": "absent.png"}]));
+    room.assert_warns(&[
+        "material 0 \"floor\"",
+        "textures",
+        "baseColorTexture",
+        "metallicRoughnessTexture",
+        "normalTexture",
+        "occlusionTexture",
+        "emissiveTexture",
+        "transmissionTexture",
+        "specularTexture",
+        "specularColorTexture",
+    ]);
+}
+
+#[test]
+fn the_specular_lobe_that_is_left_out_is_named_once_for_all_materials() {
+    let mut room = Fixture::room();
+    room.remove("/materials/0/extensions");
+    room.remove("/materials/1/extensions");
+    room.assert_warns(&["specular lobe", "\"white\" and \"lamp\""]);
+    room.set(
+        "/materials/0/extensions",
+        json!({"KHR_materials_specular": {"specularFactor": 0.5}}),
+    );
+    room.assert_warns(&["\"white\" and \"lamp\""]);
+}
+
+#[test]
+fn unused_materials_give_no_warnings() {
+    let mut room = Fixture::room();
+    room.set("/materials/-", json!({"name": "spare", "alphaMode": "BLEND"}));
+    assert!(room.scene().warnings.is_empty());
+}
+
+#[test]
+fn an_unknown_alpha_mode_is_refused() {
+    floor_of(matte(json!({"alphaMode": "DITHER"}))).assert_fails(&["material 0 \"floor\"", "alphaMode"]);
+}
+
+#[test]
+fn parts_of_meshes_and_nodes_that_are_left_out_are_named() {
+    let mut room = Fixture::room();
+    room.set("/meshes/0/primitives/0/attributes/COLOR_0", json!(1));
+    room.assert_warns(&["mesh 0 \"floor\", primitive 0", "vertex colours"]);
+
+    let mut room = Fixture::room();
+    room.set("/meshes/0/primitives/0/targets", json!([{"POSITION": 0}]));
+    room.assert_warns(&["mesh 0 \"floor\", primitive 0", "morph targets"]);
+
+    let mut room = Fixture::room();
+    room.set("/nodes/0/skin", json!(0));
+    room.set("/skins", json!([{"joints": [1]}]));
+    room.assert_warns(&["skins"]);
+
+    let mut room = Fixture::room();
+    let sampler = json!({"input": 0, "output": 0});
+    let channel = json!({"sampler": 0, "target": {"node": 0, "path": "translation"}});
+    room.set("/animations", json!([{"samplers": [sampler], "channels": [channel]}]));
+    room.assert_warns(&["animations"]);
+
+    let mut room = Fixture::room();
+    room.set("/meshes/0/primitives/0/attributes", json!({"NORMAL": 1, "_CUSTOM": 2}));
+    room.assert_warns(&["mesh 0 \"floor\", primitive 0", "no POSITION", "skipped"]);
+}
+
+#[test]
+fn attributes_of_ones_own_are_fine() {
+    let mut room = Fixture::room();
+    room.set("/meshes/0/primitives/0/attributes/_BATCH", json!(2));
+    room.set("/meshes/0/primitives/0/attributes/_OTHER", json!(2));
+    assert!(room.scene().warnings.is_empty());
+}
+
+#[test]
+fn unknown_extensions_are_named_and_refused_where_required() {
+    let mut room = Fixture::room();
+    let supported = json!([
+        "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_specular",
+        "KHR_materials_transmission",
+        "KHR_materials_volume"
+    ]);
+    room.set("/extensionsUsed", supported.clone());
+    room.set("/extensionsRequired", supported);
+    assert!(room.scene().warnings.is_empty());
+
+    room.set("/extensionsUsed/-", json!("EXT_new"));
+    room.assert_warns(&["extension \"EXT_new\"", "ignored"]);
+    room.set("/extensionsRequired/-", json!("EXT_new"));
+    room.assert_fails(&["requires the extension \"EXT_new\"", "without it"]);
+}
+
+#[test]
+fn a_required_extension_is_named_even_if_it_changes_the_format() {
+    let mut room = Fixture::room();
+    room.set("/extensionsRequired", json!(["KHR_texture_basisu"]));
+    room.set(
+        "/textures",
+        json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]),
+    );
+    room.assert_fails(&["KHR_texture_basisu"]);
+}
