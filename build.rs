@@ -35,6 +35,7 @@ fn main() -> Result<()> {
         let optimised = compile(&compiler, source, &root, shaderc::OptimizationLevel::Performance)?;
         fs::write(out.join(format!("{name}.spv")), optimised.as_binary_u8())?;
         let entry_point = reflect(named.as_binary()).with_context(|| source.display().to_string())?;
+        check_bindings(optimised.as_binary(), &entry_point).with_context(|| source.display().to_string())?;
         describe(&mut module, &name, &entry_point).with_context(|| source.display().to_string())?;
         names.push(name.to_uppercase());
     }
@@ -73,6 +74,30 @@ fn reflect(spirv: &[u32]) -> Result<EntryPoint> {
     Ok(entry_points.remove(0))
 }
 
+/// Every binding of the optimised module must have been reflected: one that is passed to a function isn't seen.
+fn check_bindings(spirv: &[u32], entry_point: &EntryPoint) -> Result<()> {
+    const OP_DECORATE: u32 = 71;
+    const BINDING: u32 = 33;
+    let reflected: Vec<u32> = entry_point
+        .vars
+        .iter()
+        .filter_map(|variable| match variable {
+            Variable::Descriptor { desc_bind, .. } => Some(desc_bind.bind()),
+            _ => None,
+        })
+        .collect();
+    let mut rest = &spirv[5..];
+    while let [first, ..] = rest {
+        let (words, op) = ((first >> 16) as usize, first & 0xffff);
+        ensure!(words > 0 && words <= rest.len(), "damaged SPIR-V");
+        if op == OP_DECORATE && rest[2] == BINDING {
+            ensure!(reflected.contains(&rest[3]), "binding {} wasn't reflected; use its buffer by name", rest[3]);
+        }
+        rest = &rest[words..];
+    }
+    Ok(())
+}
+
 /// Appends the `Shader` constant of the stage `name` to the module.
 fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result<()> {
     let mut bindings = BTreeMap::new();
@@ -80,20 +105,26 @@ fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result
     let mut push_constants = "None".to_owned();
     for variable in &entry_point.vars {
         match variable {
-            Variable::Descriptor { desc_bind, desc_ty, ty, .. } => {
-                let Type::Struct(block) = ty else { bail!("a descriptor that is no block") };
-                let buffer = block.name().context("a block without a name")?;
-                let access = match desc_ty {
-                    DescriptorType::StorageBuffer(access) => format!("Access::{}", access_name(*access)),
-                    DescriptorType::UniformBuffer() => "Access::Uniform".to_owned(),
-                    other => bail!("{buffer}: {other:?} isn't a buffer"),
+            Variable::Descriptor { name, desc_bind, desc_ty, ty, .. } => {
+                let (buffer, access, element) = match (desc_ty, ty) {
+                    (DescriptorType::StorageBuffer(access), Type::Struct(block)) => {
+                        (block.name(), access_name(*access), fields(element(block))?)
+                    }
+                    (DescriptorType::UniformBuffer(), Type::Struct(block)) => {
+                        (block.name(), "Uniform", fields(element(block))?)
+                    }
+                    (DescriptorType::UniformTexelBuffer(), _) => {
+                        (name.as_deref(), "Texels", "StructLayout { name: \"\", fields: &[] }".to_owned())
+                    }
+                    other => bail!("{other:?} isn't a buffer"),
                 };
-                let fields = fields(element(block))?;
+                let buffer = buffer.context("a buffer without a name")?;
+                let slot = desc_bind.bind();
                 bindings.insert(
-                    desc_bind.bind(),
+                    slot,
                     format!(
-                        "Binding {{ slot: {}, buffer: BufferId::{buffer}, access: {access}, element: {fields} }}",
-                        desc_bind.bind()
+                        "Binding {{ slot: {slot}, buffer: BufferId::{buffer}, access: Access::{access}, \
+                         element: {element} }}"
                     ),
                 );
             }

@@ -72,7 +72,7 @@ impl Default for RenderConfig {
 }
 
 /// Pixels of a picture's side at the most.
-const MAX_SIDE: u32 = 16384;
+pub const MAX_SIDE: u32 = 16384;
 
 impl RenderConfig {
     /// Checks every range.
@@ -164,7 +164,7 @@ impl Sizes {
             batch_paths,
             photon_lanes: 0,
             lane_capacity: 0,
-            cell_bits: (f64::from(batch_paths).log2().round() as u32).clamp(8, 20).next_multiple_of(SORT_DIGIT_BITS),
+            cell_bits: (batch_paths.ilog2() + 1).clamp(8, 24) / (2 * SORT_DIGIT_BITS) * (2 * SORT_DIGIT_BITS),
         };
         sizes.set_lanes(limits.lanes);
         sizes

@@ -61,9 +61,8 @@ pub fn sort(count: BufferId, capacity: u32, bits: u32, recording: &mut Recording
     let tiles = capacity.div_ceil(SORT_TILE);
     let mut here = (Keys, Values);
     let mut there = (OtherKeys, OtherValues);
-    let passes = bits.div_ceil(SORT_DIGIT_BITS);
     // An even number of passes ends where it began.
-    let passes = passes.next_multiple_of(2);
+    let passes = bits.div_ceil(SORT_DIGIT_BITS).next_multiple_of(2);
     for pass in 0..passes {
         let push = [pass * SORT_DIGIT_BITS, tiles];
         let bound = vec![
@@ -95,7 +94,7 @@ fn grid(sizes: &Sizes, recording: &mut Recording) {
     recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup).push(radius_sums));
     recording.dispatch(StageDesc::new(&shaders::GRID_KEYS, photons));
     sort(BufferId::PhotonCount, photons, sizes.cell_bits, recording);
-    recording.fill(BufferId::CellEnds, 0);
+    recording.fill(BufferId::CellRanges, 0);
     recording.dispatch(StageDesc::new(&shaders::GRID_CELLS, photons));
     recording.dispatch(StageDesc::new(&shaders::GATHER_GRID, sizes.slots()));
 }

@@ -218,6 +218,18 @@ device_structs! {
         pub largest_radius2: f32,
     }
 
+    /// A grid bucket's photons in the sorted order.
+    pub struct CellRange: 16 {
+        /// The first.
+        pub first: u32,
+        /// One past the last; 0 for an empty bucket.
+        pub end: u32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+    }
+
     /// What the stages report to the host.
     pub struct StatusCounters: 32 {
         /// Photons that wanted to be stored, of the batch with the most.

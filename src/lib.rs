@@ -1,4 +1,7 @@
+pub mod backend;
+pub mod cli;
 pub mod config;
+pub mod cpu;
 pub mod error;
 pub mod film;
 pub mod gather;
@@ -8,6 +11,7 @@ pub mod metrics;
 pub mod pipeline;
 pub mod radius;
 pub mod record;
+pub mod report;
 pub mod scene;
 pub mod shaders;
 pub mod stage;

@@ -1,16 +1,67 @@
-//! The order of the stages in one iteration, on a Vulkan device. [`Renderer::record_iteration`] reads like figure 1 of
-//! the paper.
+//! The order of the stages in one iteration, on a Vulkan device. [`Stages::iteration`] reads like figure 1 of the paper.
 
+use crate::backend::{Backend, Counters, DeviceDescription, settings};
 use crate::config::{Accel, DeviceLimits, Direct, Estimator, RenderConfig, Sizes};
 use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::gather::{METHODS, scan};
-use crate::gpu::{Device, Run};
-use crate::layout::{Photon, Settings, StatusCounters, VisiblePoint};
-use crate::record::Recording;
+use crate::gpu::Device;
+use crate::layout::{CellRange, Photon, Settings, StatusCounters, VisiblePoint};
+use crate::record::{Recording, Run};
 use crate::scene::{Camera, PackedScene};
-use crate::stage::{BufferId, StageDesc};
+use crate::stage::{BufferId, Shader, StageDesc};
 use crate::{radius, shaders};
+
+/// The stages of a render, as data: what an iteration runs, without a device.
+#[derive(Clone, Copy)]
+pub struct Stages<'a> {
+    /// The render's settings.
+    pub config: &'a RenderConfig,
+    /// Its buffers' sizes.
+    pub sizes: &'a Sizes,
+}
+
+impl Stages<'_> {
+    /// The commands of an iteration.
+    pub fn iteration(&self, iteration: u32) -> Recording {
+        let mut recording = Recording::new();
+        if iteration == 0 || self.config.estimator == Estimator::Sppm {
+            self.camera(iteration, &mut recording);
+        }
+        for batch in 0..self.sizes.batches(self.config.photons) {
+            self.photons(iteration, batch, &mut recording);
+            (METHODS[self.config.gather].record)(self.sizes, &mut recording);
+        }
+        recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(iteration));
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.slots()));
+        recording
+    }
+
+    /// Finding the visible points.
+    fn camera(&self, iteration: u32, recording: &mut Recording) {
+        recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(iteration));
+    }
+
+    /// Photon tracing of a batch, and moving its photons together.
+    fn photons(&self, iteration: u32, batch: u32, recording: &mut Recording) {
+        let first = batch * self.sizes.batch_paths;
+        let paths = self.sizes.batch_paths.min(self.config.photons - first);
+        let lanes = self.sizes.photon_lanes;
+        recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([iteration, first, paths]));
+        scan(BufferId::LaneOffsets, lanes, recording);
+        recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.photon_capacity()));
+    }
+
+    /// A stage that traces rays.
+    fn ray_stage(&self, shader: &'static Shader, threads: u32) -> StageDesc {
+        StageDesc::new(shader, threads).constants(vec![
+            ("BRUTE_FORCE", u32::from(self.config.accel == Accel::Brute)),
+            ("SLOTS", self.sizes.slots_per_pixel),
+            ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
+            ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),
+        ])
+    }
+}
 
 /// A progressive render on a device.
 pub struct Renderer {
@@ -21,21 +72,6 @@ pub struct Renderer {
     iterations: u32,
     emitted: u64,
     counters: Counters,
-}
-
-/// What happened in a render besides its picture.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Photons stored in all iterations.
-    pub photons_stored: u64,
-    /// Paths that the bounce limit ended.
-    pub truncated_paths: u64,
-    /// Paths that the driver's loop limit ended.
-    pub cut_paths: u64,
-    /// Values that were NaN or infinite and were left out.
-    pub non_finite: u64,
-    /// Iterations done again because photons didn't fit.
-    pub repeated_iterations: u64,
 }
 
 /// Loop iterations that photon paths of a lane may make together where the driver has a limit: a subgroup's lanes share
@@ -72,50 +108,8 @@ impl Renderer {
         Ok(renderer)
     }
 
-    /// Does one iteration; returns what its stages took.
-    ///
-    /// # Errors
-    /// A failed Vulkan call, or no memory for the photons.
-    pub fn iterate(&mut self) -> Result<Run> {
-        let recording = self.record_iteration(self.iterations);
-        let run = self.run_until_it_fits(&recording)?;
-        self.iterations += 1;
-        self.emitted += u64::from(self.config.photons);
-        Ok(run)
-    }
-
-    /// The commands of an iteration.
-    fn record_iteration(&self, iteration: u32) -> Recording {
-        let mut recording = Recording::new();
-        if iteration == 0 || self.config.estimator == Estimator::Sppm {
-            recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(iteration));
-        }
-        for batch in 0..self.sizes.batches(self.config.photons) {
-            self.record_photons(iteration, batch, &mut recording);
-            (METHODS[self.config.gather].record)(&self.sizes, &mut recording);
-        }
-        recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(iteration));
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.slots()));
-        recording
-    }
-
-    /// Photon tracing of a batch, and moving its photons together.
-    fn record_photons(&self, iteration: u32, batch: u32, recording: &mut Recording) {
-        let first = batch * self.sizes.batch_paths;
-        let paths = self.sizes.batch_paths.min(self.config.photons - first);
-        let lanes = self.sizes.photon_lanes;
-        recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([iteration, first, paths]));
-        scan(BufferId::LaneOffsets, lanes, recording);
-        recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.photon_capacity()));
-    }
-
-    fn ray_stage(&self, shader: &'static crate::stage::Shader, threads: u32) -> StageDesc {
-        StageDesc::new(shader, threads).constants(vec![
-            ("BRUTE_FORCE", u32::from(self.config.accel == Accel::Brute)),
-            ("SLOTS", self.sizes.slots_per_pixel),
-            ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
-            ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),
-        ])
+    fn stages(&self) -> Stages<'_> {
+        Stages { config: &self.config, sizes: &self.sizes }
     }
 
     /// Runs an iteration; where photons don't fit or loops are cut, makes room and does it again.
@@ -143,7 +137,7 @@ impl Renderer {
             let mut again = Recording::new();
             again.fill(BufferId::GatheredOf, 0);
             self.device.run(&again)?;
-            run = self.device.run(&self.record_iteration(self.iterations))?;
+            run = self.device.run(&self.stages().iteration(self.iterations))?;
         }
     }
 
@@ -155,43 +149,13 @@ impl Renderer {
         status.first().copied().ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
     }
 
-    /// The picture so far (eq. 4).
-    ///
-    /// # Errors
-    /// A failed Vulkan call.
-    pub fn resolve(&mut self) -> Result<Image> {
-        let mut recording = Recording::new();
-        let push = [self.iterations.max(1), (self.emitted.max(1) as f32).to_bits()];
-        recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
-        self.device.run(&recording)?;
-        let [width, height] = self.config.resolution.map(|side| side as usize);
-        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
-        let pixels = film.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
-        Ok(Image::new(width, height, pixels))
-    }
-
-    /// Iterations done.
-    pub fn iterations(&self) -> u32 {
-        self.iterations
-    }
-
-    /// Photon paths emitted.
-    pub fn emitted(&self) -> u64 {
-        self.emitted
-    }
-
-    /// What happened besides the picture.
-    pub fn counters(&self) -> Counters {
-        self.counters
-    }
-
-    /// The initial radius, render units.
-    pub fn radius(&self) -> f32 {
-        self.settings.initial_radius2.sqrt()
+    /// Sizes of the buffers.
+    pub fn sizes(&self) -> &Sizes {
+        &self.sizes
     }
 
     /// The device, to read its buffers.
-    pub fn device(&mut self) -> &mut Device {
+    pub fn gpu(&mut self) -> &mut Device {
         &mut self.device
     }
 
@@ -237,8 +201,7 @@ impl Renderer {
             (BufferId::OtherValues, photons, 4),
             (BufferId::Histograms, histograms, 4),
             (BufferId::ScanSums, scan_sums, 4),
-            (BufferId::CellStarts, cells, 4),
-            (BufferId::CellEnds, cells, 4),
+            (BufferId::CellRanges, cells, size_of::<CellRange>()),
         ] {
             self.device.create(id, count * size as u64)?;
         }
@@ -255,8 +218,8 @@ impl Renderer {
         if self.settings.initial_radius2 == 0.0 {
             let mut recording = Recording::new();
             recording.fill(BufferId::Status, 0);
-            recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(0u32));
-            self.record_photons(0, 0, &mut recording);
+            self.stages().camera(0, &mut recording);
+            self.stages().photons(0, 0, &mut recording);
             self.device.run(&recording)?;
             let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
             let count: Vec<u32> = self.device.download(BufferId::PhotonCount, Some(1))?;
@@ -278,30 +241,47 @@ impl Renderer {
     }
 }
 
-fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loop_limit: u32) -> Settings {
-    let [width, height] = config.resolution;
-    let half_height = camera.tan_half_fov;
-    let half_width = half_height * width as f32 / height as f32;
-    let with_zero = |v: glam::Vec3| [v.x, v.y, v.z, 0.0];
-    Settings {
-        camera_position: with_zero(camera.position),
-        camera_right: with_zero(camera.right * half_width),
-        camera_up: with_zero(camera.up * half_height),
-        camera_forward: with_zero(camera.forward),
-        resolution: config.resolution,
-        slots_per_pixel: 1,
-        seed: config.seed,
-        light_count: scene.lights.len() as u32,
-        light_flux: scene.light_flux as f32,
-        max_depth: config.max_depth,
-        triangle_count: scene.shading_triangles.len() as u32,
-        photon_lanes: 0,
-        lane_capacity: 0,
-        photon_capacity: 0,
-        cell_bits: 0,
-        alpha: config.alpha,
-        initial_radius2: config.radius.map_or(0.0, |radius| (radius * scene.scale).powi(2) as f32),
-        loop_limit,
-        scan_padding: 0,
+impl Backend for Renderer {
+    fn iterate(&mut self) -> Result<Run> {
+        let recording = self.stages().iteration(self.iterations);
+        let run = self.run_until_it_fits(&recording)?;
+        self.iterations += 1;
+        self.emitted += u64::from(self.config.photons);
+        Ok(run)
+    }
+
+    fn resolve(&mut self) -> Result<Image> {
+        let mut recording = Recording::new();
+        let push = [self.iterations.max(1), (self.emitted.max(1) as f32).to_bits()];
+        recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
+        self.device.run(&recording)?;
+        let [width, height] = self.config.resolution.map(|side| side as usize);
+        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
+        Ok(Image::new(width, height, film.iter().map(|&[r, g, b, _]| [r, g, b]).collect()))
+    }
+
+    fn iterations(&self) -> u32 {
+        self.iterations
+    }
+
+    fn emitted(&self) -> u64 {
+        self.emitted
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    fn radius(&self) -> f32 {
+        self.settings.initial_radius2.sqrt()
+    }
+
+    fn device(&self) -> DeviceDescription {
+        let summary = self.device.summary();
+        DeviceDescription {
+            name: summary.name.clone(),
+            driver: summary.driver.clone(),
+            timestamp_period_ns: summary.timestamp_period_ns,
+        }
     }
 }

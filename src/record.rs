@@ -2,6 +2,7 @@
 //! earlier one read. Knows no Vulkan, so that the hazards of a whole iteration are tested without a device.
 
 use std::collections::HashMap;
+use std::time::Duration;
 
 use crate::stage::{BufferId, StageDesc};
 
@@ -74,4 +75,24 @@ impl Recording {
         }
         self.commands.push(command);
     }
+}
+
+/// When a launch of a stage ran.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Launch {
+    /// The stage.
+    pub stage: &'static str,
+    /// Begin, in nanoseconds of the device's clock.
+    pub begin_ns: f64,
+    /// Nanoseconds that it took.
+    pub duration_ns: f64,
+}
+
+/// What a run of a recording took.
+#[derive(Debug, Clone, Default)]
+pub struct Run {
+    /// Its launches in order.
+    pub launches: Vec<Launch>,
+    /// From the submission to the fence.
+    pub wall: Duration,
 }

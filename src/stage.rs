@@ -44,10 +44,8 @@ pub enum BufferId {
     SortedPhotons,
     /// [`crate::layout::GridShape`].
     Grid,
-    /// First photon of each grid bucket, u32.
-    CellStarts,
-    /// One past the last photon of each grid bucket, u32; 0 for an empty one.
-    CellEnds,
+    /// [`crate::layout::CellRange`] of each grid bucket.
+    CellRanges,
     /// Sort keys, u32.
     Keys,
     /// What is sorted by [`BufferId::Keys`], u32.
@@ -92,6 +90,8 @@ pub enum Access {
     ReadWrite,
     /// A uniform block.
     Uniform,
+    /// A `usamplerBuffer`: 16-byte texels, read only.
+    Texels,
 }
 
 impl Access {

@@ -14,7 +14,7 @@ bool loops_left() {
 // Havel and Herout, «Yet faster ray-triangle intersection (using SSE4)», 2010: the test with precomputed planes.
 // Accepts 0 < t < hit.t.
 bool intersect_triangle(uint index, vec3 origin, vec3 direction, inout Hit hit) {
-    HavelTriangle triangle = havel_triangles[index];
+    HavelTriangle triangle = havel_triangle(index);
     float det = dot(direction, triangle.n0.xyz);
     float det_t = triangle.n0.w - dot(origin, triangle.n0.xyz);
     float inverse = 1.0 / det;
@@ -44,7 +44,7 @@ float enter_box(vec3 box_min, vec3 box_max, vec3 inverse_direction, vec3 scaled_
     return enter <= leave ? enter : 1e30;
 }
 
-const uint STACK_SIZE = 48u;
+const uint STACK_SIZE = 64u;
 
 // The nearest triangle but `ignored` before t = limit. With any_hit: some triangle before it.
 Hit trace(vec3 origin, vec3 direction, float limit, uint ignored, bool any_hit) {
@@ -72,7 +72,7 @@ Hit trace(vec3 origin, vec3 direction, float limit, uint ignored, bool any_hit) 
     bool complete = false;
     while (loops_left()) {
         loop_count += 1u;
-        BvhNode node = bvh[node_index];
+        BvhNode node = bvh_node(node_index);
         float enter_left = enter_box(node.left_min.xyz, node.left_max.xyz, inverse_direction, scaled_origin, hit.t);
         float enter_right = enter_box(node.right_min.xyz, node.right_max.xyz, inverse_direction, scaled_origin, hit.t);
         uint left = floatBitsToUint(node.left_min.w);

@@ -6,7 +6,12 @@ struct Light {
     float area;        // render units²
 };
 
-layout(std430) readonly buffer Lights { Light lights[]; };
+uniform usamplerBuffer Lights;
+
+Light light_at(uint i) {
+    uvec4 bits = TEXEL_BITS(Lights, i);
+    return Light(bits.x, uintBitsToFloat(bits.y), uintBitsToFloat(bits.z), uintBitsToFloat(bits.w));
+}
 
 // The light at u in [0, 1), by bisection of the cumulative probabilities.
 uint choose_light(float u) {
@@ -14,7 +19,7 @@ uint choose_light(float u) {
     uint high = settings.light_count - 1u;
     while (low < high) {
         uint middle = (low + high) / 2u;
-        if (u < lights[middle].cumulative) {
+        if (u < light_at(middle).cumulative) {
             high = middle;
         } else {
             low = middle + 1u;

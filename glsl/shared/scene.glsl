@@ -1,4 +1,4 @@
-// The scene as the rays see it. Include after settings.glsl and sampling.glsl.
+// The scene as the rays see it. Include after settings.glsl, sampling.glsl and texel.glsl.
 
 const uint MISS = 0xffffffffu;
 
@@ -42,10 +42,32 @@ struct Material {
     uint padding2;
 };
 
-layout(std430) readonly buffer Bvh { BvhNode bvh[]; };
-layout(std430) readonly buffer HavelTriangles { HavelTriangle havel_triangles[]; };
-layout(std430) readonly buffer ShadingTriangles { ShadingTriangle shading_triangles[]; };
-layout(std430) readonly buffer Materials { Material materials[]; };
+uniform usamplerBuffer Bvh;
+uniform usamplerBuffer HavelTriangles;
+uniform usamplerBuffer ShadingTriangles;
+uniform usamplerBuffer Materials;
+
+BvhNode bvh_node(uint i) {
+    return BvhNode(TEXEL(Bvh, 4u * i), TEXEL(Bvh, 4u * i + 1u), TEXEL(Bvh, 4u * i + 2u), TEXEL(Bvh, 4u * i + 3u));
+}
+
+HavelTriangle havel_triangle(uint i) {
+    return HavelTriangle(TEXEL(HavelTriangles, 3u * i), TEXEL(HavelTriangles, 3u * i + 1u),
+                         TEXEL(HavelTriangles, 3u * i + 2u));
+}
+
+ShadingTriangle shading_triangle(uint i) {
+    uvec4 rest = TEXEL_BITS(ShadingTriangles, 4u * i + 3u);
+    return ShadingTriangle(TEXEL(ShadingTriangles, 4u * i), TEXEL(ShadingTriangles, 4u * i + 1u),
+                           TEXEL(ShadingTriangles, 4u * i + 2u), rest.x, rest.y, rest.z, rest.w);
+}
+
+Material material_at(uint i) {
+    vec4 color = TEXEL(Materials, 3u * i);
+    vec4 emission = TEXEL(Materials, 3u * i + 1u);
+    uvec4 rest = TEXEL_BITS(Materials, 3u * i + 2u);
+    return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, rest.y, rest.z, rest.w);
+}
 
 struct Hit {
     float t;
@@ -78,7 +100,7 @@ vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_norma
 
 // The point is rebuilt from the barycentric coordinates: unlike origin + t·direction its error doesn't grow with t.
 Surface surface_at(uint index, vec2 uv) {
-    ShadingTriangle triangle = shading_triangles[index];
+    ShadingTriangle triangle = shading_triangle(index);
     vec3 e1 = triangle.p1.xyz - triangle.p0.xyz;
     vec3 e2 = triangle.p2.xyz - triangle.p0.xyz;
     Surface surface;

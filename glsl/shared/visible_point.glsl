@@ -7,6 +7,9 @@ struct VisiblePoint {
     vec4 emitted_normal;  // rgb: radiance that the path saw by itself; w: uint bits, octahedral shading normal, same side
 };
 
+#define VISIBLE_POINT(i) \
+    VisiblePoint(TEXEL(VisiblePoints, 3u * (i)), TEXEL(VisiblePoints, 3u * (i) + 1u), TEXEL(VisiblePoints, 3u * (i) + 2u))
+
 const uint NO_OBJECT = 0xffffffffu;
 
 const uint TILE = 8u;

@@ -5,6 +5,7 @@
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
+#include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"
 #include "bsdf.glsl"
@@ -70,7 +71,7 @@ void main() {
             cut = true;
         } else if (hit.triangle != MISS) {
             Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
-            Material material = materials[surface.material];
+            Material material = material_at(surface.material);
             Facing facing = face(surface, branch.direction);
             if (emits(material, facing.front)) {
                 branch.emitted += branch.throughput * material.emission;

@@ -3,12 +3,13 @@
 // Moves the lanes' photons together, in the order of lanes.
 
 #include "settings.glsl"
+#include "texel.glsl"
 #include "photon.glsl"
 #include "status.glsl"
 
 layout(local_size_x = 64) in;
 
-layout(std430) readonly buffer LanePhotons { Photon lane_photons[]; };
+uniform usamplerBuffer LanePhotons;
 layout(std430) readonly buffer LaneCounts { uint lane_counts[]; };
 layout(std430) readonly buffer LaneOffsets { uint lane_offsets[]; };
 layout(std430) readonly buffer ScanTotal { uint scan_total; };
@@ -35,7 +36,7 @@ void main() {
     if (number < lane_counts[lane]) {
         uint target = lane_offsets[lane] + number;
         if (target < settings.photon_capacity) {
-            photons[target] = lane_photons[i];
+            photons[target] = PHOTON(LanePhotons, i);
         }
     }
 }

@@ -6,6 +6,7 @@
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
+#include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"
 #include "bsdf.glsl"
@@ -23,16 +24,16 @@ layout(push_constant) uniform Push {
     uint iteration;
 } push;
 
-layout(std430) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+uniform usamplerBuffer VisiblePoints;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 
 vec3 sample_light(VisiblePoint visible_point, uint slot) {
     Random random = random_for(LIGHT_SAMPLE, slot, push.iteration, settings.seed);
     vec4 u = next4(random);
-    Light light = lights[choose_light(u.x)];
+    Light light = light_at(choose_light(u.x));
     vec2 uv = triangle_point(u.yz);
     Surface emitter = surface_at(light.triangle, uv);
-    Material material = materials[emitter.material];
+    Material material = material_at(emitter.material);
 
     vec3 position = visible_point.position_object.xyz;
     vec3 geometric_normal = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
@@ -67,7 +68,7 @@ void main() {
     if (slot >= pixel_slots() * settings.slots_per_pixel || status.overflow != 0u) {
         return;
     }
-    VisiblePoint visible_point = visible_points[slot];
+    VisiblePoint visible_point = VISIBLE_POINT(slot);
     vec3 radiance = visible_point.emitted_normal.rgb;
     if (SAMPLE_LIGHTS && floatBitsToUint(visible_point.position_object.w) != NO_OBJECT) {
         radiance += sample_light(visible_point, slot);

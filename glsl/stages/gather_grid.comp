@@ -3,6 +3,7 @@
 // Gathers from the cells of the hashed grid that a visible point's radius reaches.
 
 #include "settings.glsl"
+#include "texel.glsl"
 #include "sampling.glsl"
 #include "photon.glsl"
 #include "visible_point.glsl"
@@ -13,12 +14,11 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
-layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
+uniform usamplerBuffer VisiblePoints;
+uniform usamplerBuffer StatisticsOf;
 layout(std430) readonly buffer Grid { GridShape grid; };
-layout(std430) readonly buffer SortedPhotons { Photon sorted_photons[]; };
-layout(std430) readonly buffer CellStarts { uint cell_starts[]; };
-layout(std430) readonly buffer CellEnds { uint cell_ends[]; };
+uniform usamplerBuffer SortedPhotons;
+uniform usamplerBuffer CellRanges;
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 
 void main() {
@@ -26,7 +26,7 @@ void main() {
     if (slot >= pixel_slots() * settings.slots_per_pixel) {
         return;
     }
-    Receiver receiver = receiver_of(visible_points[slot], statistics[slot].radius2_high);
+    Receiver receiver = receiver_of(VISIBLE_POINT(slot), TEXEL(StatisticsOf, 3u * slot).x);
     if (receiver.object == NO_OBJECT) {
         return;
     }
@@ -41,10 +41,9 @@ void main() {
         for (int y = low.y; y <= high.y; y++) {
             for (int x = low.x; x <= high.x; x++) {
                 ivec3 cell = ivec3(x, y, z);
-                uint bucket = bucket_of(cell);
-                uint end = cell_ends[bucket];
-                for (uint i = end == 0u ? 0u : cell_starts[bucket]; i < end; i++) {
-                    Photon photon = sorted_photons[i];
+                uvec4 range = TEXEL_BITS(CellRanges, bucket_of(cell));
+                for (uint i = range.x; i < range.y; i++) {
+                    Photon photon = PHOTON(SortedPhotons, i);
                     // Cells that share a bucket must not be counted twice.
                     if (accepts(receiver, photon) && cell_of(photon.position_object.xyz, inverse) == cell) {
                         flux += photon.flux_direction.rgb;

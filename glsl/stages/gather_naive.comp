@@ -4,6 +4,7 @@
 // since drivers cut long loops).
 
 #include "settings.glsl"
+#include "texel.glsl"
 #include "sampling.glsl"
 #include "photon.glsl"
 #include "visible_point.glsl"
@@ -17,9 +18,9 @@ layout(push_constant) uniform Push {
     uint last;
 } push;
 
-layout(std430) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
-layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
-layout(std430) readonly buffer Photons { Photon photons[]; };
+uniform usamplerBuffer VisiblePoints;
+uniform usamplerBuffer StatisticsOf;
+uniform usamplerBuffer Photons;
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 
@@ -28,14 +29,14 @@ void main() {
     if (slot >= pixel_slots() * settings.slots_per_pixel) {
         return;
     }
-    Receiver receiver = receiver_of(visible_points[slot], statistics[slot].radius2_high);
+    Receiver receiver = receiver_of(VISIBLE_POINT(slot), TEXEL(StatisticsOf, 3u * slot).x);
     if (receiver.object == NO_OBJECT) {
         return;
     }
     vec3 flux = vec3(0.0);
     uint count = 0u;
     for (uint i = push.first; i < min(push.last, photon_count); i++) {
-        Photon photon = photons[i];
+        Photon photon = PHOTON(Photons, i);
         if (accepts(receiver, photon)) {
             flux += photon.flux_direction.rgb;
             count += 1u;

@@ -2,17 +2,25 @@
 #extension GL_GOOGLE_include_directive : require
 // Puts the photons into the sorted order and notes where each bucket begins and ends.
 
+#include "texel.glsl"
 #include "photon.glsl"
+
+// A bucket's photons in the sorted order; padded to a texel.
+struct CellRange {
+    uint first;
+    uint end;
+    uint padding0;
+    uint padding1;
+};
 
 layout(local_size_x = 64) in;
 
 layout(std430) readonly buffer Keys { uint keys[]; };
 layout(std430) readonly buffer Values { uint values[]; };
-layout(std430) readonly buffer Photons { Photon photons[]; };
+uniform usamplerBuffer Photons;
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
 layout(std430) writeonly buffer SortedPhotons { Photon sorted_photons[]; };
-layout(std430) writeonly buffer CellStarts { uint cell_starts[]; };
-layout(std430) writeonly buffer CellEnds { uint cell_ends[]; }; // cleared before: an empty bucket ends at 0
+layout(std430) writeonly buffer CellRanges { CellRange cell_ranges[]; }; // cleared before: empty buckets are (0, 0)
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -21,10 +29,10 @@ void main() {
     }
     uint key = keys[i];
     if (i == 0u || keys[i - 1u] != key) {
-        cell_starts[key] = i;
+        cell_ranges[key].first = i;
     }
     if (i + 1u == photon_count || keys[i + 1u] != key) {
-        cell_ends[key] = i + 1u;
+        cell_ranges[key].end = i + 1u;
     }
-    sorted_photons[i] = photons[values[i]];
+    sorted_photons[i] = PHOTON(Photons, values[i]);
 }

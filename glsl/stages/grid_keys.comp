@@ -3,6 +3,7 @@
 // The bucket of each photon, to be sorted by.
 
 #include "settings.glsl"
+#include "texel.glsl"
 #include "photon.glsl"
 
 #include "grid.glsl"
@@ -10,7 +11,7 @@
 layout(local_size_x = 64) in;
 
 layout(std430) readonly buffer Grid { GridShape grid; };
-layout(std430) readonly buffer Photons { Photon photons[]; };
+uniform usamplerBuffer Photons;
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
 layout(std430) writeonly buffer Keys { uint keys[]; };
 layout(std430) writeonly buffer Values { uint values[]; };
@@ -20,6 +21,6 @@ void main() {
     if (i >= photon_count) {
         return;
     }
-    keys[i] = bucket_of(cell_of(photons[i].position_object.xyz, grid.inverse_cell_size));
+    keys[i] = bucket_of(cell_of(TEXEL(Photons, 2u * i).xyz, grid.inverse_cell_size));
     values[i] = i;
 }

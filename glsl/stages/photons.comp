@@ -7,6 +7,7 @@
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
+#include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"
 #include "bsdf.glsl"
@@ -40,9 +41,9 @@ struct Path {
 Path emit(inout Random random) {
     vec4 u = next4(random);
     vec4 w = next4(random);
-    Light light = lights[choose_light(u.x)];
+    Light light = light_at(choose_light(u.x));
     Surface emitter = surface_at(light.triangle, triangle_point(u.yz));
-    Material material = materials[emitter.material];
+    Material material = material_at(emitter.material);
     vec3 normal = emitter.geometric_normal;
     if (material.double_sided != 0u && w.z < 0.5) {
         normal = -normal;
@@ -104,7 +105,7 @@ void main() {
             continue;
         }
         Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
-        Material material = materials[surface.material];
+        Material material = material_at(surface.material);
         Facing facing = face(surface, path.direction);
         vec4 u = next4(random);
         vec3 incoming = path.direction;

@@ -4,6 +4,7 @@
 // next iteration's grid.
 
 #include "settings.glsl"
+#include "texel.glsl"
 #include "sampling.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
@@ -13,7 +14,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+uniform usamplerBuffer VisiblePoints;
 layout(std430) buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
@@ -28,7 +29,7 @@ void main() {
     bool counts = false;
     float radius2 = 0.0;
     if (slot < pixel_slots() * settings.slots_per_pixel && status.overflow == 0u) {
-        VisiblePoint visible_point = visible_points[slot];
+        VisiblePoint visible_point = VISIBLE_POINT(slot);
         Statistics mine = statistics[slot];
         counts = floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
         if (counts) {

@@ -10,6 +10,8 @@ use crate::error::{Error, Result};
 pub(super) struct Buffer {
     pub handle: vk::Buffer,
     pub bytes: u64,
+    /// The buffer as texels of four u32, where some stage reads it so.
+    texels: Option<vk::BufferView>,
     allocation: Option<Allocation>,
 }
 
@@ -19,6 +21,7 @@ impl Buffer {
             MemoryLocation::GpuOnly => {
                 vk::BufferUsageFlags::STORAGE_BUFFER
                     | vk::BufferUsageFlags::UNIFORM_BUFFER
+                    | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
                     | vk::BufferUsageFlags::TRANSFER_SRC
                     | vk::BufferUsageFlags::TRANSFER_DST
             }
@@ -52,8 +55,23 @@ impl Buffer {
                 .bind_buffer_memory(handle, allocation.memory(), allocation.offset())
                 .or_vulkan("vkBindBufferMemory")?;
             context.name(handle, name);
-            Ok(Self { handle, bytes: bytes.max(4), allocation: Some(allocation) })
+            Ok(Self { handle, bytes: bytes.max(4), texels: None, allocation: Some(allocation) })
         }
+    }
+
+    /// The view through which texels are read, made when it is first asked for.
+    pub fn texels(&mut self, context: &Context) -> Result<vk::BufferView> {
+        if let Some(view) = self.texels {
+            return Ok(view);
+        }
+        let create = vk::BufferViewCreateInfo::default()
+            .buffer(self.handle)
+            .format(vk::Format::R32G32B32A32_UINT)
+            .range(vk::WHOLE_SIZE);
+        // SAFETY: the buffer is alive; `free` destroys the view before it.
+        let view = unsafe { context.device.create_buffer_view(&create, None) }.or_vulkan("vkCreateBufferView")?;
+        self.texels = Some(view);
+        Ok(view)
     }
 
     /// The memory of a host-visible buffer.
@@ -64,7 +82,12 @@ impl Buffer {
     /// Gives the buffer back. The device must not be using it.
     pub fn free(mut self, context: &Context) {
         // SAFETY: the caller has waited for the work that used it.
-        unsafe { context.device.destroy_buffer(self.handle, None) };
+        unsafe {
+            if let Some(view) = self.texels {
+                context.device.destroy_buffer_view(view, None);
+            }
+            context.device.destroy_buffer(self.handle, None);
+        }
         if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), context.allocator.lock()) {
             // A failure here means that the allocation wasn't the allocator's, which it is.
             let _ = allocator.free(allocation);

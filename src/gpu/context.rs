@@ -54,7 +54,7 @@ pub(super) type Messages = Arc<Mutex<Vec<String>>>;
 
 /// Loader and instance.
 pub(super) struct Instance {
-    pub entry: ash::Entry,
+    _entry: ash::Entry, // keeps the loader
     pub handle: ash::Instance,
     debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     pub messages: Messages,
@@ -137,7 +137,7 @@ impl Instance {
             } else {
                 None
             };
-            Ok(Self { entry, handle, debug, messages })
+            Ok(Self { _entry: entry, handle, debug, messages })
         }
     }
 

@@ -10,28 +10,8 @@ use super::context::{Context, OrVulkan};
 use super::device::Device;
 use super::pipeline::descriptor_type;
 use crate::error::{Error, Result};
-use crate::record::{Command, Recording};
-use crate::stage::{BufferId, StageDesc};
-
-/// When a launch of a stage ran.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Launch {
-    /// The stage.
-    pub stage: &'static str,
-    /// Begin, in nanoseconds of the device's clock.
-    pub begin_ns: f64,
-    /// Nanoseconds that it took.
-    pub duration_ns: f64,
-}
-
-/// What a run of a recording took.
-#[derive(Debug, Clone, Default)]
-pub struct Run {
-    /// Its launches in order.
-    pub launches: Vec<Launch>,
-    /// From the submission to the fence.
-    pub wall: Duration,
-}
+use crate::record::{Command, Launch, Recording, Run};
+use crate::stage::{Access, BufferId, StageDesc};
 
 impl Device {
     /// Runs a recording and waits for it.
@@ -269,8 +249,12 @@ impl Scratch {
             let all = stages.iter().flat_map(|stage| stage.uses());
             all.filter(|(_, _, access)| descriptor_type(*access) == access_type).count().max(1) as u32
         };
-        let sizes = [vk::DescriptorType::STORAGE_BUFFER, vk::DescriptorType::UNIFORM_BUFFER]
-            .map(|ty| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count(ty)));
+        let sizes = [
+            vk::DescriptorType::STORAGE_BUFFER,
+            vk::DescriptorType::UNIFORM_BUFFER,
+            vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+        ]
+        .map(|ty| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count(ty)));
         let mut layouts = Vec::with_capacity(stages.len());
         for stage in stages {
             layouts.push(device.pipelines.get(&device.context, stage)?.set_layout);
@@ -291,15 +275,20 @@ impl Scratch {
         for (stage, set) in stages.iter().zip(&self.sets) {
             device.context.name(*set, stage.shader.name);
             for (slot, id, access) in stage.uses() {
-                let buffer = device.handle(id).map_err(|_| {
+                let buffer = device.buffers.get_mut(&id).ok_or_else(|| {
                     Error::Device(format!("stage {} uses {id:?} before it is made", stage.shader.name))
                 })?;
-                let info = [vk::DescriptorBufferInfo::default().buffer(buffer).range(vk::WHOLE_SIZE)];
-                let write = vk::WriteDescriptorSet::default()
+                let info = [vk::DescriptorBufferInfo::default().buffer(buffer.handle).range(vk::WHOLE_SIZE)];
+                let mut write = vk::WriteDescriptorSet::default()
                     .dst_set(*set)
                     .dst_binding(slot)
                     .descriptor_type(descriptor_type(access))
                     .buffer_info(&info);
+                let view;
+                if access == Access::Texels {
+                    view = [buffer.texels(&device.context)?];
+                    write = write.texel_buffer_view(&view);
+                }
                 // SAFETY: set and buffer are alive, and the set isn't in use.
                 unsafe { vulkan.update_descriptor_sets(&[write], &[]) };
             }

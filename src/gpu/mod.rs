@@ -11,4 +11,3 @@ mod self_check;
 
 pub use context::DeviceSummary;
 pub use device::{Device, devices};
-pub use execute::{Launch, Run};

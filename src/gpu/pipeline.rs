@@ -32,6 +32,7 @@ pub(super) struct Pipelines {
 pub(super) fn descriptor_type(access: Access) -> vk::DescriptorType {
     match access {
         Access::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
+        Access::Texels => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
         _ => vk::DescriptorType::STORAGE_BUFFER,
     }
 }

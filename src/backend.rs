@@ -1,0 +1,113 @@
+//! What a progressive renderer offers, whatever it runs on.
+
+use crate::config::RenderConfig;
+use crate::error::Result;
+use crate::film::Image;
+use crate::layout::Settings;
+use crate::record::Run;
+use crate::scene::{Camera, PackedScene};
+
+/// A progressive render that is under way.
+pub trait Backend {
+    /// Does one iteration; returns what its stages took.
+    ///
+    /// # Errors
+    /// Whatever the device can't do.
+    fn iterate(&mut self) -> Result<Run>;
+    /// The picture so far (eq. 4).
+    ///
+    /// # Errors
+    /// Whatever the device can't do.
+    fn resolve(&mut self) -> Result<Image>;
+    /// Iterations done.
+    fn iterations(&self) -> u32;
+    /// Photon paths emitted in all iterations.
+    fn emitted(&self) -> u64;
+    /// What happened besides the picture.
+    fn counters(&self) -> Counters;
+    /// The initial radius, render units.
+    fn radius(&self) -> f32;
+    /// What it runs on.
+    fn device(&self) -> DeviceDescription;
+}
+
+/// What a render runs on, for reports.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct DeviceDescription {
+    /// Name.
+    pub name: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// Nanoseconds of a timestamp tick.
+    pub timestamp_period_ns: f32,
+}
+
+/// What happened in a render besides its picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counters {
+    /// Photons stored in all iterations.
+    pub photons_stored: u64,
+    /// Paths that the bounce limit ended.
+    pub truncated_paths: u64,
+    /// Paths that the driver's loop limit ended.
+    pub cut_paths: u64,
+    /// Values that were NaN or infinite and were left out.
+    pub non_finite: u64,
+    /// Iterations done again because photons didn't fit.
+    pub repeated_iterations: u64,
+}
+
+impl Counters {
+    /// What of it a user has to know, one line each.
+    pub fn warnings(&self, emitted: u64, max_depth: u32) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let share = |paths: u64| 100.0 * paths as f64 / emitted.max(1) as f64;
+        if self.truncated_paths > 0 {
+            warnings.push(format!(
+                "{} paths ({:.4} % of the photon paths) reached --max-depth {max_depth}; their further light is missing",
+                self.truncated_paths,
+                share(self.truncated_paths)
+            ));
+        }
+        if self.cut_paths > 0 {
+            warnings.push(format!(
+                "{} paths were ended by the driver's loop limit; their light is missing: use another --device",
+                self.cut_paths
+            ));
+        }
+        if self.non_finite > 0 {
+            warnings.push(format!("{} values were NaN or infinite and were left out", self.non_finite));
+        }
+        warnings
+    }
+}
+
+/// What the stages read of the configuration, the scene and the camera; the buffers' sizes are left at 0. The initial R²
+/// is 0 where it has to be found.
+pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loop_limit: u32) -> Settings {
+    let [width, height] = config.resolution;
+    let half_height = camera.tan_half_fov;
+    let half_width = half_height * width as f32 / height as f32;
+    let with_zero = |v: glam::Vec3| [v.x, v.y, v.z, 0.0];
+    Settings {
+        camera_position: with_zero(camera.position),
+        camera_right: with_zero(camera.right * half_width),
+        camera_up: with_zero(camera.up * half_height),
+        camera_forward: with_zero(camera.forward),
+        resolution: config.resolution,
+        slots_per_pixel: 1,
+        seed: config.seed,
+        light_count: scene.lights.len() as u32,
+        light_flux: scene.light_flux as f32,
+        max_depth: config.max_depth,
+        triangle_count: scene.shading_triangles.len() as u32,
+        photon_lanes: 0,
+        lane_capacity: 0,
+        photon_capacity: 0,
+        cell_bits: 0,
+        alpha: config.alpha,
+        initial_radius2: config.radius.map_or(0.0, |radius| (radius * scene.scale).powi(2) as f32),
+        loop_limit,
+        scan_padding: 0,
+    }
+}

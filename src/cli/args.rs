@@ -1,0 +1,165 @@
+//! The arguments, as cli.md gives them to scripts.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::config::{Accel, Direct, Estimator};
+use crate::gather;
+
+/// Progressive photon mapping on Vulkan: a glTF scene in, an OpenEXR picture out.
+#[derive(Debug, Parser)]
+#[command(name = "ppm-vk", version, args_conflicts_with_subcommands = true, arg_required_else_help = true)]
+pub struct Arguments {
+    #[command(flatten)]
+    pub render: RenderArguments,
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// What there is besides rendering.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// List the Vulkan devices, their limits, and whether the program runs on them.
+    Devices {
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// List the gather methods.
+    Gathers,
+    /// Say what a scene holds.
+    Inspect {
+        /// glTF file (.gltf or .glb).
+        scene: PathBuf,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// What computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BackendChoice {
+    /// A Vulkan device.
+    Vulkan,
+    /// The processor, without Vulkan: the reference that the kernels are tested against.
+    Cpu,
+}
+
+/// A render.
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    /// glTF file to render (.gltf or .glb).
+    #[arg(long, value_name = "FILE", required = true)]
+    pub scene: Option<PathBuf>,
+    /// Linear RGB OpenEXR picture [default: the scene's name with .exr, in the current folder].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Tone-mapped picture.
+    #[arg(long, value_name = "FILE")]
+    pub png: Option<PathBuf>,
+    /// Exposure of the PNG, in stops.
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
+    pub exposure: f32,
+    /// Pixels [default: 1280 wide at the camera's aspect ratio].
+    #[arg(long, value_name = "WxH", value_parser = resolution)]
+    pub resolution: Option<[u32; 2]>,
+    /// Camera, by name or index [default: the scene's first].
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+    /// Stop after so many iterations [default: 64 if there is no --time].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub iterations: Option<u32>,
+    /// Stop after so many seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub time: Option<f64>,
+    /// Photon paths emitted in an iteration.
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub photons: u32,
+    /// New visible points each iteration, or the same ones all the time as in the paper.
+    #[arg(long, value_enum, default_value_t = Estimator::Sppm)]
+    pub estimator: Estimator,
+    /// Direct light by sampling the lights, or by photons as in the paper.
+    #[arg(long, value_enum, default_value_t = Direct::Light)]
+    pub direct: Direct,
+    /// Eq. 2's α: the part of an iteration's photons that a visible point keeps.
+    #[arg(long, value_name = "A", default_value_t = 2.0 / 3.0, value_parser = alpha)]
+    pub alpha: f32,
+    /// Initial radius in scene units [default: from the photons' density, printed].
+    #[arg(long, value_name = "R", value_parser = radius)]
+    pub radius: Option<f64>,
+    /// How visible points find their photons (ppm-vk gathers lists the methods).
+    #[arg(long, value_name = "METHOD", default_value = gather::METHODS[gather::default_method()].name,
+          value_parser = gather_method)]
+    pub gather: usize,
+    /// How rays meet triangles.
+    #[arg(long, value_enum, default_value_t = Accel::Bvh)]
+    pub accel: Accel,
+    /// Bounces of a camera or photon path at the most.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_depth: u32,
+    /// Seed: the same one on the same device gives the same picture, bit for bit.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
+    /// Vulkan device, by a part of its name or its index [default: the best].
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// What computes.
+    #[arg(long, value_enum, default_value_t = BackendChoice::Vulkan)]
+    pub backend: BackendChoice,
+    /// After the run, print what each stage took.
+    #[arg(long)]
+    pub profile: bool,
+    /// Write the profile as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub profile_json: Option<PathBuf>,
+    /// Write every launch as a Chrome or Perfetto trace.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
+    /// No progress bar.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+fn resolution(text: &str) -> Result<[u32; 2], String> {
+    let parsed = text
+        .split_once(['x', 'X'])
+        .and_then(|(width, height)| Some([width.parse::<u32>().ok()?, height.parse::<u32>().ok()?]));
+    match parsed {
+        Some(sides) if sides.iter().all(|side| (1..=crate::config::MAX_SIDE).contains(side)) => Ok(sides),
+        Some(_) => Err(format!("each side must lie between 1 and {}", crate::config::MAX_SIDE)),
+        None => Err("expected WIDTHxHEIGHT, such as 1280x720".to_owned()),
+    }
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    text.parse::<f64>().map_err(|_| "expected a number".to_owned())
+}
+
+fn alpha(text: &str) -> Result<f32, String> {
+    let alpha = number(text)? as f32;
+    if alpha > 0.0 && alpha < 1.0 { Ok(alpha) } else { Err("must lie between 0 and 1, both excluded".to_owned()) }
+}
+
+fn radius(text: &str) -> Result<f64, String> {
+    let radius = number(text)?;
+    if radius > 0.0 && radius.is_finite() { Ok(radius) } else { Err("must be above 0".to_owned()) }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = number(text)?;
+    if seconds > 0.0 && seconds.is_finite() { Ok(seconds) } else { Err("must be above 0".to_owned()) }
+}
+
+fn exposure(text: &str) -> Result<f32, String> {
+    let stops = number(text)? as f32;
+    if stops.abs() <= 100.0 { Ok(stops) } else { Err("must lie between -100 and 100".to_owned()) }
+}
+
+fn gather_method(name: &str) -> Result<usize, String> {
+    gather::method(name).ok_or_else(|| {
+        let names: Vec<_> = gather::METHODS.iter().map(|method| method.name).collect();
+        format!("no such method; there are {}", names.join(", "))
+    })
+}

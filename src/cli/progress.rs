@@ -1,0 +1,86 @@
+//! The progress bar: iterations, photons a second, time left.
+
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::backend::Backend;
+
+/// When a render stops.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// After so many iterations.
+    pub iterations: Option<u32>,
+    /// After so much time.
+    pub time: Option<Duration>,
+}
+
+impl Limits {
+    /// The part of the render that is done, 0 to 1.
+    pub fn done(&self, iterations: u32, elapsed: Duration) -> f64 {
+        let by_iterations = self.iterations.map_or(0.0, |limit| f64::from(iterations) / f64::from(limit));
+        let by_time = self.time.map_or(0.0, |limit| elapsed.as_secs_f64() / limit.as_secs_f64());
+        by_iterations.max(by_time).min(1.0)
+    }
+}
+
+/// A bar on stderr; nothing where stderr is no terminal.
+pub struct Progress {
+    bar: ProgressBar,
+    limits: Limits,
+    start: Instant,
+}
+
+const STEPS: u64 = 1000;
+
+impl Progress {
+    /// A bar for a render that begins now; invisible if `quiet`.
+    pub fn new(limits: Limits, quiet: bool) -> Self {
+        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(Some(STEPS), target);
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} % {msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, limits, start: Instant::now() }
+    }
+
+    /// Shows where the render is.
+    pub fn show(&self, backend: &dyn Backend) {
+        let elapsed = self.start.elapsed();
+        let done = self.limits.done(backend.iterations(), elapsed);
+        self.bar.set_position((done * STEPS as f64) as u64);
+        let seconds = elapsed.as_secs_f64().max(1e-9);
+        let of = self.limits.iterations.map_or(String::new(), |limit| format!("/{limit}"));
+        let left = if done > 0.0 { seconds * (1.0 - done) / done } else { 0.0 };
+        self.bar.set_message(format!(
+            "{}{of} iterations, {} photon paths/s, {} left",
+            backend.iterations(),
+            with_prefix(backend.emitted() as f64 / seconds),
+            clock(left)
+        ));
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// A number with a metric prefix.
+pub fn with_prefix(value: f64) -> String {
+    match value {
+        v if v >= 1e9 => format!("{:.2} G", v * 1e-9),
+        v if v >= 1e6 => format!("{:.2} M", v * 1e-6),
+        v if v >= 1e3 => format!("{:.0} k", v * 1e-3),
+        v => format!("{v:.0} "),
+    }
+}
+
+fn clock(seconds: f64) -> String {
+    let seconds = seconds.round() as u64;
+    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
+        (0, 0, s) => format!("{s} s"),
+        (0, m, s) => format!("{m}:{s:02} min"),
+        (h, m, _) => format!("{h}:{m:02} h"),
+    }
+}

@@ -1,0 +1,156 @@
+//! Renders a scene to files.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+
+use super::args::{BackendChoice, RenderArguments};
+use super::progress::{Limits, Progress, with_prefix};
+use super::{Outcome, interrupt};
+use crate::backend::Backend;
+use crate::config::RenderConfig;
+use crate::film::{self, Metadata};
+use crate::gather::METHODS;
+use crate::gpu::Device;
+use crate::pipeline::Renderer;
+use crate::report::{Profile, Subject};
+use crate::scene::{Camera, PackedScene, Scene};
+
+/// Width of a picture without --resolution.
+const DEFAULT_WIDTH: u32 = 1280;
+/// Aspect ratio where neither the user nor the camera gives one.
+const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
+/// Iterations where the user gives neither them nor a time.
+const DEFAULT_ITERATIONS: u32 = 64;
+
+/// The render command.
+pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
+    let path = arguments.scene.as_deref().context("--scene is missing")?;
+    let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
+    // Before any work: nobody wants to learn after an hour that the picture can't be written.
+    for file in outputs(arguments, &output) {
+        film::check_writable(file)?;
+    }
+    interrupt::install()?;
+
+    let scene = Scene::load(path)?;
+    for warning in &scene.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let camera = &scene.cameras[scene.camera_index(arguments.camera.as_deref())?];
+    let config = config(arguments, camera);
+    let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(path, what))?;
+    let mut backend = open(arguments, &packed, camera, &config)?;
+    if arguments.radius.is_none() {
+        eprintln!("initial radius {:.6} scene units (automatic)", f64::from(backend.radius()) / packed.scale);
+    }
+
+    let start = Instant::now();
+    let limits = Limits {
+        iterations: arguments.iterations.or(arguments.time.is_none().then_some(DEFAULT_ITERATIONS)),
+        time: arguments.time.map(Duration::from_secs_f64),
+    };
+    let progress = Progress::new(limits, arguments.quiet);
+    let mut profile = Profile::default();
+    while limits.done(backend.iterations(), start.elapsed()) < 1.0 && !(interrupt::asked() && backend.iterations() > 0) {
+        profile.add(backend.iterate()?);
+        progress.show(backend.as_ref());
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    progress.finish();
+
+    let image = backend.resolve()?;
+    let metadata = Metadata {
+        iterations: u64::from(backend.iterations()),
+        photons_emitted: backend.emitted(),
+        seed: u64::from(arguments.seed),
+        device: backend.device().name,
+        seconds,
+        estimated_error: None,
+    };
+    film::write_exr(&image, &output, &metadata)?;
+    if let Some(png) = &arguments.png {
+        film::write_png(&image, png, arguments.exposure)?;
+    }
+    for warning in backend.counters().warnings(backend.emitted(), config.max_depth) {
+        eprintln!("warning: {warning}");
+    }
+    eprintln!(
+        "{}: {}x{}, {} iterations, {} photon paths, {seconds:.1} s ({} photon paths/s) on {}",
+        output.display(),
+        image.width(),
+        image.height(),
+        backend.iterations(),
+        backend.emitted(),
+        with_prefix(backend.emitted() as f64 / seconds),
+        backend.device().name,
+    );
+    let subject = Subject {
+        scene: scene.name.clone(),
+        resolution: config.resolution,
+        gather: METHODS[config.gather].name.to_owned(),
+        photons: config.photons,
+        device: backend.device(),
+        counters: backend.counters(),
+    };
+    write_profile(arguments, &profile, &subject)?;
+    Ok(if interrupt::asked() { Outcome::Interrupted } else { Outcome::Done })
+}
+
+fn open(
+    arguments: &RenderArguments,
+    scene: &PackedScene,
+    camera: &Camera,
+    config: &RenderConfig,
+) -> Result<Box<dyn Backend>> {
+    Ok(match arguments.backend {
+        BackendChoice::Vulkan => {
+            let device = Device::open(arguments.device.as_deref())?;
+            Box::new(Renderer::new(device, scene, camera, config.clone())?)
+        }
+        BackendChoice::Cpu => anyhow::bail!("cpu backend: not yet"),
+    })
+}
+
+fn config(arguments: &RenderArguments, camera: &Camera) -> RenderConfig {
+    RenderConfig {
+        resolution: arguments.resolution.unwrap_or_else(|| {
+            let height = DEFAULT_WIDTH as f32 / camera.aspect.unwrap_or(DEFAULT_ASPECT);
+            [DEFAULT_WIDTH, (height.round() as u32).clamp(1, crate::config::MAX_SIDE)]
+        }),
+        photons: arguments.photons,
+        estimator: arguments.estimator,
+        direct: arguments.direct,
+        alpha: arguments.alpha,
+        radius: arguments.radius,
+        gather: arguments.gather,
+        accel: arguments.accel,
+        max_depth: arguments.max_depth,
+        seed: arguments.seed,
+    }
+}
+
+fn default_output(scene: &Path) -> PathBuf {
+    PathBuf::from(scene.file_stem().unwrap_or(scene.as_os_str())).with_extension("exr")
+}
+
+fn outputs<'a>(arguments: &'a RenderArguments, output: &'a Path) -> impl Iterator<Item = &'a Path> {
+    let others = [&arguments.png, &arguments.profile_json, &arguments.trace];
+    std::iter::once(output).chain(others.into_iter().filter_map(|file| file.as_deref()))
+}
+
+fn write_profile(arguments: &RenderArguments, profile: &Profile, subject: &Subject) -> Result<()> {
+    if arguments.profile {
+        print!("{}", profile.table(subject));
+    }
+    for (file, value) in [
+        (&arguments.profile_json, arguments.profile_json.as_ref().map(|_| profile.json(subject))),
+        (&arguments.trace, arguments.trace.as_ref().map(|_| profile.trace(subject))),
+    ] {
+        if let (Some(file), Some(value)) = (file, value) {
+            film::write_whole(file, &serde_json::to_vec_pretty(&value)?)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,140 @@
+//! Camera rays: follows each pixel's path over mirrors and glass to its visible points.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::intersect::{Ray, nearest_hit};
+use super::light::emits;
+use super::random::{PathKind, Random};
+use super::sampling::encode_direction;
+use super::surface::{Boundary, Facing, MATTE, MIRROR, surface_at};
+use super::tiles::{pixel_of, pixel_slots};
+use super::vector::{rgb, with_word, xyz};
+use super::{Counts, FAR, Inputs};
+use crate::config::Estimator;
+use crate::layout::{NO_OBJECT, VisiblePoint};
+
+/// What is left of a path that splits at glass.
+struct Branch {
+    ray: Ray,
+    throughput: DVec3,
+    emitted: DVec3,
+    depth: u32,
+    ignored: Option<u32>,
+}
+
+/// The visible points of an iteration, in slot order: as many for each pixel slot as
+/// [`Settings::slots_per_pixel`](crate::layout::Settings::slots_per_pixel) says.
+pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Vec<VisiblePoint> {
+    let slots_per_pixel = inputs.settings.slots_per_pixel as usize;
+    let mut visible_points = vec![nothing_seen(DVec3::ZERO); pixel_slots(inputs.settings) * slots_per_pixel];
+    visible_points.par_chunks_mut(slots_per_pixel).enumerate().for_each(|(pixel_slot, slots)| {
+        if let Some(pixel) = pixel_of(inputs.settings, pixel_slot as u32) {
+            follow(inputs, pixel, iteration, slots, counts);
+        }
+    });
+    visible_points
+}
+
+/// A visible point whose path met no matte surface.
+fn nothing_seen(emitted: DVec3) -> VisiblePoint {
+    VisiblePoint {
+        position_object: with_word(DVec3::ZERO, NO_OBJECT),
+        weight_normal: [0.0; 4],
+        emitted_normal: with_word(emitted, 0),
+    }
+}
+
+fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [VisiblePoint], counts: &Counts) {
+    let settings = inputs.settings;
+    let [width, _] = settings.resolution;
+    let mut random = Random::new(PathKind::Camera, pixel[1] * width + pixel[0], iteration, settings.seed);
+    let [jitter_x, jitter_y, ..] = random.next4();
+    let [x, y] = match inputs.config.estimator {
+        Estimator::Sppm => [jitter_x, jitter_y],
+        Estimator::Ppm => [0.5; 2],
+    };
+    // −1 to 1 from left to right and from top to bottom.
+    let film = |pixel: u32, inside: f64, side: u32| (f64::from(pixel) + inside) / f64::from(side) * 2.0 - 1.0;
+    let direction = xyz(settings.camera_forward)
+        + film(pixel[0], x, settings.resolution[0]) * xyz(settings.camera_right)
+        - film(pixel[1], y, settings.resolution[1]) * xyz(settings.camera_up);
+
+    let mut pending = vec![Branch {
+        ray: Ray {
+            origin: xyz(settings.camera_position),
+            direction: direction.normalize(),
+        },
+        throughput: DVec3::ONE,
+        emitted: DVec3::ZERO,
+        depth: 0,
+        ignored: None,
+    }];
+    let mut used = 0;
+    while let Some(mut branch) = pending.pop() {
+        slots[used] = loop {
+            let Some(hit) = nearest_hit(inputs, branch.ray, FAR, branch.ignored) else {
+                break nothing_seen(branch.emitted);
+            };
+            let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+            let incoming = branch.ray.direction;
+            let facing = Facing::new(&surface, incoming);
+            let base_color = rgb(surface.material.base_color);
+            if emits(surface.material, facing.front) {
+                branch.emitted += branch.throughput * rgb(surface.material.emission);
+            }
+            if surface.material.surface == MATTE {
+                if base_color.max_element() == 0.0 {
+                    break nothing_seen(branch.emitted);
+                }
+                // The Lambertian BRDF is albedo / π.
+                let weight = branch.throughput * base_color / PI;
+                break VisiblePoint {
+                    position_object: with_word(surface.position, surface.object),
+                    weight_normal: with_word(weight, encode_direction(facing.geometric_normal)),
+                    emitted_normal: with_word(branch.emitted, encode_direction(facing.shading_normal)),
+                };
+            }
+            if branch.depth + 1 >= settings.max_depth {
+                counts.add_truncated(1);
+                break nothing_seen(branch.emitted);
+            }
+            branch.depth += 1;
+            branch.ignored = Some(hit.triangle);
+            let [choice, ..] = random.next4();
+            branch.ray.direction = if surface.material.surface == MIRROR {
+                branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
+                facing.reflect(incoming)
+            } else {
+                let boundary = Boundary::new(&facing, incoming, surface.material.ior);
+                // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
+                let transmission = base_color * boundary.eta.powi(2);
+                match boundary.refracted {
+                    // While a slot is free, both branches are followed, each weighed with its share.
+                    Some(refracted) if used + pending.len() + 1 < slots.len() => {
+                        pending.push(Branch {
+                            ray: Ray {
+                                origin: facing.origin_towards(surface.position, boundary.reflected),
+                                direction: boundary.reflected,
+                            },
+                            throughput: branch.throughput * boundary.reflectance,
+                            emitted: DVec3::ZERO,
+                            ..branch
+                        });
+                        branch.throughput *= (1.0 - boundary.reflectance) * transmission;
+                        refracted
+                    }
+                    Some(refracted) if choice >= boundary.reflectance => {
+                        branch.throughput *= transmission;
+                        refracted
+                    }
+                    _ => boundary.reflected,
+                }
+            };
+            branch.ray.origin = facing.origin_towards(surface.position, branch.ray.direction);
+        };
+        used += 1;
+    }
+}

@@ -1,0 +1,118 @@
+//! The photons within each visible point's radius.
+
+use glam::DVec3;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use rayon::prelude::*;
+
+use super::sampling::decode_direction;
+use super::vector::{word, xyz};
+use crate::error::{Error, Result};
+use crate::layout::{Gathered, NO_OBJECT, Photon, Statistics, VisiblePoint};
+
+/// How much farther than R the kd-tree is asked: more than the rounding of the squared distance, which the tree and
+/// the predicate sum up differently.
+const MARGIN: f32 = 1.0 + 1e-5;
+
+/// Sum of flux and number of accepted photons. Thousands of f32 of like size add up in f64 without rounding, so the
+/// order in which photons are found doesn't matter.
+#[derive(Default)]
+struct Sum {
+    flux: DVec3,
+    count: u32,
+}
+
+impl Sum {
+    fn add(&mut self, photon: &Photon) {
+        self.flux += xyz(photon.flux_direction);
+        self.count += 1;
+    }
+
+    fn add_to(&self, gathered: &mut Gathered) {
+        let flux = (xyz(gathered.flux_count) + self.flux).as_vec3();
+        let count = word(gathered.flux_count) + self.count;
+        gathered.flux_count = [flux.x, flux.y, flux.z, f32::from_bits(count)];
+    }
+}
+
+/// The gather's side of a visible point.
+struct Receiver {
+    position: [f32; 3],
+    radius2: f32,
+    object: u32,
+    normal: DVec3,
+}
+
+fn position(position_object: [f32; 4]) -> [f32; 3] {
+    [position_object[0], position_object[1], position_object[2]]
+}
+
+impl Receiver {
+    /// `None` where the path met no matte surface.
+    fn new(point: &VisiblePoint, statistics: &Statistics) -> Option<Self> {
+        let object = word(point.position_object);
+        (object != NO_OBJECT).then(|| Self {
+            position: position(point.position_object),
+            radius2: statistics.radius2_high,
+            object,
+            normal: decode_direction(word(point.weight_normal)),
+        })
+    }
+
+    /// `accepts` of `glsl/shared/gather.glsl`: within R, on the same object, and arriving on the side that the viewer
+    /// sees. The distance is rounded to f32 at each step as there, so that both count the same photons.
+    fn accepts(&self, photon: &Photon) -> bool {
+        let here = position(photon.position_object);
+        let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| here[axis] - self.position[axis]);
+        x * x + y * y + z * z <= self.radius2
+            && word(photon.position_object) == self.object
+            && decode_direction(word(photon.flux_direction)).dot(self.normal) < 0.0
+    }
+}
+
+/// Adds to each slot the photons that it accepts, by testing every photon.
+pub fn gather_naive(
+    visible_points: &[VisiblePoint],
+    statistics: &[Statistics],
+    photons: &[Photon],
+    gathered: &mut [Gathered],
+) {
+    gathered.par_iter_mut().zip(visible_points).zip(statistics).for_each(|((gathered, point), statistics)| {
+        if let Some(receiver) = Receiver::new(point, statistics) {
+            let mut sum = Sum::default();
+            photons.iter().filter(|photon| receiver.accepts(photon)).for_each(|photon| sum.add(photon));
+            sum.add_to(gathered);
+        }
+    });
+}
+
+/// Adds to each slot the photons that it accepts, by asking a kd-tree for those nearby: the paper's CPU version.
+///
+/// # Errors
+/// [`Error::Config`] if there are more photons than the tree can number.
+pub fn gather_kd_tree(
+    visible_points: &[VisiblePoint],
+    statistics: &[Statistics],
+    photons: &[Photon],
+    gathered: &mut [Gathered],
+) -> Result<()> {
+    if photons.is_empty() {
+        return Ok(());
+    }
+    let positions: Vec<[f32; 3]> = photons.iter().map(|photon| position(photon.position_object)).collect();
+    let tree = ImmutableKdTree::new_from_slice(&positions)
+        .map_err(|error| Error::Config(format!("kd-tree: {error}; try fewer --photons")))?;
+    gathered.par_iter_mut().zip(visible_points).zip(statistics).for_each(|((gathered, point), statistics)| {
+        if let Some(receiver) = Receiver::new(point, statistics) {
+            let mut sum = Sum::default();
+            let near = receiver.radius2 * MARGIN;
+            tree.query(&receiver.position).within::<SquaredEuclidean<f32>>(near).unsorted().visit(|found| {
+                let photon = &photons[found.item as usize];
+                if receiver.accepts(photon) {
+                    sum.add(photon);
+                }
+            });
+            sum.add_to(gathered);
+        }
+    });
+    Ok(())
+}

@@ -1,0 +1,85 @@
+//! The stages on the CPU: the oracle of the kernel tests, what `--backend cpu` renders with, and the paper's CPU
+//! column.
+//!
+//! Each stage of `glsl/stages` has a plain function of its name here, which reads and writes the same structs of
+//! [`crate::layout`] and draws the same random numbers. Where it decides, it works in f64 and rounds to f32 what it
+//! stores: intersections, directions, Fresnel, sums, statistics. So it is an oracle and no copy of the kernels; for the
+//! same reason gathering is left to a kd-tree here, and to no grid.
+//!
+//! Every function gives the same bits whatever the number of threads: paths are dealt to lanes, not to threads, and no
+//! sum depends on an order.
+
+mod camera;
+mod direct;
+mod gather;
+mod intersect;
+mod light;
+mod photons;
+mod primitives;
+mod random;
+mod renderer;
+mod resolve;
+mod sampling;
+mod surface;
+mod tiles;
+mod update;
+mod vector;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+pub use camera::camera;
+pub use direct::direct;
+pub use gather::{gather_kd_tree, gather_naive};
+pub use intersect::{Hit, Ray, is_blocked, nearest_hit};
+pub use photons::{Batch, compact, photons};
+pub use primitives::{scan, sort};
+pub use random::{PathKind, Random, pcg4d};
+pub use renderer::Renderer;
+pub use resolve::resolve;
+pub use sampling::{decode_direction, encode_direction};
+pub use update::{radius_sums, reset, update};
+
+use crate::config::RenderConfig;
+use crate::layout::Settings;
+use crate::scene::PackedScene;
+
+/// A ray's limit where it has none; nothing lies so far, for the scene is 2 long.
+const FAR: f64 = 1e30;
+
+/// What the ray stages read.
+#[derive(Debug, Clone, Copy)]
+pub struct Inputs<'a> {
+    /// Triangles, materials, lights.
+    pub scene: &'a PackedScene,
+    /// What the kernels read as well.
+    pub settings: &'a Settings,
+    /// What the kernels are specialised for.
+    pub config: &'a RenderConfig,
+}
+
+/// What the stages count, as [`crate::layout::StatusCounters`] on a device.
+#[derive(Debug, Default)]
+pub struct Counts {
+    truncated_paths: AtomicU64,
+    non_finite: AtomicU64,
+}
+
+impl Counts {
+    /// Paths that the bounce limit ended.
+    pub fn truncated_paths(&self) -> u64 {
+        self.truncated_paths.load(Ordering::Relaxed)
+    }
+
+    /// Values that were NaN or infinite and were left out.
+    pub fn non_finite(&self) -> u64 {
+        self.non_finite.load(Ordering::Relaxed)
+    }
+
+    fn add_truncated(&self, paths: u64) {
+        self.truncated_paths.fetch_add(paths, Ordering::Relaxed);
+    }
+
+    fn add_non_finite(&self, values: u64) {
+        self.non_finite.fetch_add(values, Ordering::Relaxed);
+    }
+}

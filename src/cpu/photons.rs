@@ -1,0 +1,138 @@
+//! Photon tracing, and moving the photons together.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::intersect::{Ray, nearest_hit};
+use super::light::choose_light;
+use super::random::{PathKind, Random};
+use super::sampling::{cosine_direction, encode_direction, triangle_point};
+use super::surface::{Boundary, Facing, MATTE, MIRROR, offset_origin, surface_at};
+use super::vector::{rgb, with_word};
+use super::{Counts, FAR, Inputs};
+use crate::config::Direct;
+use crate::layout::Photon;
+
+/// Photon paths that are followed together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Batch {
+    /// The iteration.
+    pub iteration: u32,
+    /// Number within the iteration of its first path.
+    pub first_path: u32,
+    /// Its paths.
+    pub paths: u32,
+}
+
+/// Follows a batch of photon paths. The photons of each lane, in path order: lane i of n follows the paths i, i + n,
+/// i + 2n, …
+pub fn photons(inputs: &Inputs<'_>, batch: Batch, counts: &Counts) -> Vec<Vec<Photon>> {
+    let lanes = inputs.settings.photon_lanes;
+    let follow_lane = |lane: u32| {
+        let mut photons = Vec::new();
+        for path in (lane..batch.paths).step_by(lanes as usize) {
+            follow(inputs, batch.first_path + path, batch.iteration, &mut photons, counts);
+        }
+        photons
+    };
+    (0..lanes).into_par_iter().map(follow_lane).collect()
+}
+
+/// The photons of all lanes, one lane after the other.
+pub fn compact(lanes: &[Vec<Photon>]) -> Vec<Photon> {
+    lanes.concat()
+}
+
+struct Path {
+    ray: Ray,
+    flux: DVec3,
+    ignored: Option<u32>,
+    /// No specular bounce since the light: direct light, which the stage `direct` samples.
+    seen_directly: bool,
+}
+
+/// Starts a path on a light chosen in proportion to its flux.
+fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Path {
+    let [choice, u, v, _] = random.next4();
+    let [direction_u, direction_v, side, _] = random.next4();
+    let light = choose_light(&inputs.scene.lights, choice);
+    let (u, v) = triangle_point(u, v);
+    let emitter = surface_at(inputs.scene, light.triangle, u, v);
+    let back = emitter.material.double_sided != 0 && side < 0.5;
+    let normal = if back { -emitter.geometric_normal } else { emitter.geometric_normal };
+    let emission = rgb(emitter.material.emission);
+    // Le · π · area · sides over the light's probability, mean(Le) · π · area · sides / Σ(…).
+    let flux = emission * f64::from(inputs.settings.light_flux) / (emission.element_sum() / 3.0);
+    Path {
+        ray: Ray {
+            origin: offset_origin(emitter.position, normal),
+            direction: cosine_direction(normal, direction_u, direction_v),
+        },
+        flux,
+        ignored: Some(light.triangle),
+        seen_directly: true,
+    }
+}
+
+/// Russian roulette that keeps the photons' powers alike: a photon survives with the ratio of the largest channels of
+/// the scattered and the arriving flux. `None` for one that doesn't.
+fn roulette(arriving: DVec3, scattered: DVec3, u: f64) -> Option<DVec3> {
+    let probability = (scattered.max_element() / arriving.max_element()).min(1.0);
+    (u < probability).then(|| scattered / probability)
+}
+
+fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Photon>, counts: &Counts) {
+    let settings = inputs.settings;
+    let samples_lights = inputs.config.direct == Direct::Light;
+    let mut random = Random::new(PathKind::Photon, path, iteration, settings.seed);
+    let mut path = emit(inputs, &mut random);
+    for _ in 0..settings.max_depth {
+        let Some(hit) = nearest_hit(inputs, path.ray, FAR, path.ignored) else { return };
+        let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+        let material = surface.material;
+        let incoming = path.ray.direction;
+        let facing = Facing::new(&surface, incoming);
+        let [choice, second, survival, _] = random.next4();
+        let (direction, flux) = if material.surface == MATTE {
+            // Flux is per area of the geometric surface, scattering per cosine to the shading normal: Veach, «Robust
+            // Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
+            let flux = path.flux * incoming.dot(facing.shading_normal) / incoming.dot(facing.geometric_normal);
+            if !flux.is_finite() {
+                counts.add_non_finite(1);
+                return;
+            }
+            if !(samples_lights && path.seen_directly) {
+                photons.push(Photon {
+                    position_object: with_word(surface.position, surface.object),
+                    flux_direction: with_word(flux, encode_direction(incoming)),
+                });
+            }
+            // Drawn around the geometric normal, the outgoing direction needs no second correction.
+            let outgoing = cosine_direction(facing.geometric_normal, choice, second);
+            let scattered = roulette(path.flux, flux * rgb(material.base_color), survival);
+            (outgoing, scattered.filter(|_| outgoing.dot(facing.shading_normal) > 0.0))
+        } else if material.surface == MIRROR {
+            let reflected = path.flux * facing.mirror_reflectance(material.base_color, incoming);
+            (facing.reflect(incoming), roulette(path.flux, reflected, survival))
+        } else {
+            let boundary = Boundary::new(&facing, incoming, material.ior);
+            match boundary.refracted {
+                Some(refracted) if choice >= boundary.reflectance => {
+                    (refracted, roulette(path.flux, path.flux * rgb(material.base_color), survival))
+                }
+                _ => (boundary.reflected, Some(path.flux)),
+            }
+        };
+        let Some(flux) = flux else { return };
+        path = Path {
+            ray: Ray {
+                origin: facing.origin_towards(surface.position, direction),
+                direction,
+            },
+            flux,
+            ignored: Some(hit.triangle),
+            seen_directly: false,
+        };
+    }
+    counts.add_truncated(1);
+}

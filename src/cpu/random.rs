@@ -1,0 +1,94 @@
+//! The numbers that `glsl/shared/random.glsl` draws, bit for bit.
+
+/// What kind of path draws: mixed into the seed, so that kinds don't draw the same numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PathKind {
+    /// From the camera; its number is the pixel's, row by row.
+    Camera = 0x6361_6d65,
+    /// Of a photon; its number is that within the iteration.
+    Photon = 0x7068_6f74,
+    /// From a visible point to a light; its number is the slot.
+    LightSample = 0x6c69_6768,
+}
+
+/// The numbers of one path in one iteration.
+#[derive(Debug, Clone, Copy)]
+pub struct Random {
+    path: u32,
+    iteration: u32,
+    seed: u32,
+    dimension: u32,
+}
+
+impl Random {
+    /// The path's numbers from the first one on.
+    pub fn new(kind: PathKind, path: u32, iteration: u32, seed: u32) -> Self {
+        Self {
+            path,
+            iteration,
+            seed: seed ^ kind as u32,
+            dimension: 0,
+        }
+    }
+
+    /// The next four numbers, uniform in [0, 1): multiples of 2⁻²⁴, so that an f32 holds each of them.
+    pub fn next4(&mut self) -> [f64; 4] {
+        let bits = pcg4d([self.path, self.iteration, self.seed, self.dimension]);
+        self.dimension = self.dimension.wrapping_add(1);
+        bits.map(|word| f64::from(word >> 8) / f64::from(1 << 24))
+    }
+}
+
+/// PCG 4D: Jarzynski and Olano, «Hash Functions for GPU Rendering», JCGT 9(3), 2020.
+pub fn pcg4d(v: [u32; 4]) -> [u32; 4] {
+    let mix = |[mut x, mut y, mut z, mut w]: [u32; 4]| {
+        x = x.wrapping_add(y.wrapping_mul(w));
+        y = y.wrapping_add(z.wrapping_mul(x));
+        z = z.wrapping_add(x.wrapping_mul(y));
+        w = w.wrapping_add(y.wrapping_mul(z));
+        [x, y, z, w]
+    };
+    let v = v.map(|word| word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+    mix(mix(v).map(|word| word ^ word >> 16))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_uniform_and_those_of_neighbouring_paths_independent() {
+        let count = 1 << 16;
+        let (mut sum, mut squares, mut products) = (0.0, 0.0, 0.0);
+        for path in 0..count {
+            let [x, ..] = Random::new(PathKind::Photon, path, 0, 0).next4();
+            let [y, ..] = Random::new(PathKind::Photon, path + 1, 0, 0).next4();
+            assert!((0.0..1.0).contains(&x), "{x} of path {path} isn't in [0, 1)");
+            sum += x - 0.5;
+            squares += (x - 0.5) * (x - 0.5);
+            products += (x - 0.5) * (y - 0.5);
+        }
+        let n = f64::from(count);
+        // Five standard deviations of each mean: 0.289, 0.0745 and 0.0833 over √n.
+        assert!((sum / n).abs() < 5.0 * 0.289 / n.sqrt(), "mean {}", sum / n);
+        assert!((squares / n - 1.0 / 12.0).abs() < 5.0 * 0.0745 / n.sqrt(), "variance {}", squares / n);
+        assert!((products / n).abs() < 5.0 * 0.0833 / n.sqrt(), "covariance {}", products / n);
+    }
+
+    #[test]
+    fn kind_path_iteration_seed_and_dimension_all_matter() {
+        let first = |kind, path, iteration, seed| Random::new(kind, path, iteration, seed).next4();
+        let mut again = Random::new(PathKind::Camera, 1, 2, 3);
+        let numbers = again.next4();
+        assert_eq!(numbers, first(PathKind::Camera, 1, 2, 3));
+        for other in [
+            again.next4(),
+            first(PathKind::Photon, 1, 2, 3),
+            first(PathKind::Camera, 2, 2, 3),
+            first(PathKind::Camera, 1, 3, 3),
+            first(PathKind::Camera, 1, 2, 4),
+        ] {
+            assert_ne!(numbers, other);
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The order of the stages in one iteration, on the CPU.
+
+use std::time::Instant;
+
+use bytemuck::Zeroable;
+
+use super::{Batch, Counts, Inputs, camera, compact, direct, gather_kd_tree, photons, reset, resolve, update};
+use crate::backend::{Backend, Counters, DeviceDescription, settings};
+use crate::config::{DeviceLimits, Estimator, RenderConfig, Sizes};
+use crate::error::Result;
+use crate::film::Image;
+use crate::layout::{DirectSum, Gathered, Settings, Statistics, VisiblePoint};
+use crate::radius;
+use crate::record::{Launch, Run};
+use crate::scene::{Camera, PackedScene};
+
+/// Lanes that a batch's photon paths are dealt to, whatever the number of threads. As many as on a CPU's Vulkan
+/// device, so that both give the photons in the same order.
+const LANES: u32 = 4096;
+/// Bytes of a batch's photons at the most.
+const PHOTON_BYTES: u64 = 1 << 30;
+
+/// A progressive render on the CPU, with all threads of rayon's pool.
+pub struct Renderer {
+    scene: PackedScene,
+    config: RenderConfig,
+    sizes: Sizes,
+    settings: Settings,
+    visible_points: Vec<VisiblePoint>,
+    statistics: Vec<Statistics>,
+    gathered: Vec<Gathered>,
+    direct_sums: Vec<DirectSum>,
+    iterations: u32,
+    emitted: u64,
+    counters: Counters,
+    made: Instant,
+}
+
+impl Renderer {
+    /// Prepares a render: finds the radius, resets the statistics. The gather method of `config` doesn't matter: on the
+    /// CPU it is a kd-tree.
+    ///
+    /// # Errors
+    /// A setting outside its range.
+    pub fn new(scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
+        config.check()?;
+        let limits = DeviceLimits {
+            storage_buffer_bytes: PHOTON_BYTES,
+            loop_limit: u32::MAX,
+            lanes: LANES,
+        };
+        let sizes = Sizes::new(&config, limits);
+        let slots = sizes.slots() as usize;
+        let mut renderer = Self {
+            scene: scene.clone(),
+            sizes,
+            settings: Settings {
+                slots_per_pixel: sizes.slots_per_pixel,
+                photon_lanes: sizes.photon_lanes,
+                ..settings(&config, scene, camera, limits.loop_limit)
+            },
+            config,
+            visible_points: Vec::new(),
+            statistics: Vec::new(),
+            gathered: vec![Gathered::zeroed(); slots],
+            direct_sums: vec![DirectSum::zeroed(); slots],
+            iterations: 0,
+            emitted: 0,
+            counters: Counters::default(),
+            made: Instant::now(),
+        };
+        renderer.choose_radius();
+        renderer.statistics = vec![reset(renderer.settings.initial_radius2); slots];
+        Ok(renderer)
+    }
+
+    /// What the stages read of the configuration and the camera.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Takes the user's radius, or finds one from the density of a first batch of photons.
+    fn choose_radius(&mut self) {
+        if self.settings.initial_radius2 == 0.0 {
+            let inputs = Inputs {
+                scene: &self.scene,
+                settings: &self.settings,
+                config: &self.config,
+            };
+            let counts = Counts::default();
+            let visible_points = camera(&inputs, 0, &counts);
+            let photons = compact(&photons(&inputs, batch_of(&self.sizes, &self.config, 0, 0), &counts));
+            let radius = radius::automatic(&visible_points, &photons);
+            // A batch is a part of the iteration's photons; the density is that of the whole.
+            let share = f64::from(self.sizes.batch_paths) / f64::from(self.config.photons);
+            self.settings.initial_radius2 = (radius * radius * share) as f32;
+        }
+    }
+}
+
+impl Backend for Renderer {
+    fn iterate(&mut self) -> Result<Run> {
+        let iteration = self.iterations;
+        let inputs = Inputs {
+            scene: &self.scene,
+            settings: &self.settings,
+            config: &self.config,
+        };
+        let counts = Counts::default();
+        let mut clock = Clock {
+            made: self.made,
+            run: Run::default(),
+        };
+        if iteration == 0 || self.config.estimator == Estimator::Sppm {
+            self.visible_points = clock.time("camera", || camera(&inputs, iteration, &counts));
+        }
+        for batch in 0..self.sizes.batches(self.config.photons) {
+            let batch = batch_of(&self.sizes, &self.config, iteration, batch);
+            let lanes = clock.time("photons", || photons(&inputs, batch, &counts));
+            let photons = clock.time("compact", || compact(&lanes));
+            clock.time("gather_kd_tree", || {
+                gather_kd_tree(&self.visible_points, &self.statistics, &photons, &mut self.gathered)
+            })?;
+            self.counters.photons_stored += photons.len() as u64;
+        }
+        clock.time("direct", || direct(&inputs, iteration, &self.visible_points, &counts, &mut self.direct_sums));
+        clock.time("update", || {
+            update(&self.visible_points, self.config.alpha, &counts, &mut self.gathered, &mut self.statistics);
+        });
+        self.counters.truncated_paths += counts.truncated_paths();
+        self.counters.non_finite += counts.non_finite();
+        self.iterations += 1;
+        self.emitted += u64::from(self.config.photons);
+        Ok(clock.run)
+    }
+
+    fn resolve(&mut self) -> Result<Image> {
+        let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
+        let film = resolve(&self.settings, &self.statistics, &self.direct_sums, iterations, emitted);
+        let [width, height] = self.config.resolution.map(|side| side as usize);
+        Ok(Image::new(width, height, film.iter().map(|&[r, g, b, _]| [r, g, b]).collect()))
+    }
+
+    fn iterations(&self) -> u32 {
+        self.iterations
+    }
+
+    fn emitted(&self) -> u64 {
+        self.emitted
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    fn radius(&self) -> f32 {
+        self.settings.initial_radius2.sqrt()
+    }
+
+    fn device(&self) -> DeviceDescription {
+        DeviceDescription {
+            name: "CPU".to_owned(),
+            driver: format!("{} threads", rayon::current_num_threads()),
+            timestamp_period_ns: 1.0,
+        }
+    }
+}
+
+fn batch_of(sizes: &Sizes, config: &RenderConfig, iteration: u32, batch: u32) -> Batch {
+    let first_path = batch * sizes.batch_paths;
+    Batch {
+        iteration,
+        first_path,
+        paths: sizes.batch_paths.min(config.photons - first_path),
+    }
+}
+
+/// Notes when stages run.
+struct Clock {
+    made: Instant,
+    run: Run,
+}
+
+impl Clock {
+    fn time<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
+        let begin = Instant::now();
+        let result = work();
+        let duration = begin.elapsed();
+        self.run.wall += duration;
+        self.run.launches.push(Launch {
+            stage,
+            begin_ns: (begin - self.made).as_secs_f64() * 1e9,
+            duration_ns: duration.as_secs_f64() * 1e9,
+        });
+        result
+    }
+}

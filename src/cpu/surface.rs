@@ -1,0 +1,206 @@
+//! Where a ray meets a surface and how it goes on: `surface_at` and `offset_origin` of `glsl/shared/scene.glsl`, and
+//! `glsl/shared/bsdf.glsl`, in f64.
+
+use glam::DVec3;
+
+use super::sampling::decode_direction;
+use super::vector::{rgb, word, xyz};
+use crate::layout::{Material, ShadingTriangle};
+use crate::scene::PackedScene;
+
+/// [`Material::surface`] of a Lambertian reflector.
+pub(super) const MATTE: u32 = 0;
+/// [`Material::surface`] of a perfect mirror.
+pub(super) const MIRROR: u32 = 1;
+
+/// A point of a triangle.
+pub(super) struct Surface<'a> {
+    pub position: DVec3,
+    /// Unit vector on the triangle's front.
+    pub geometric_normal: DVec3,
+    /// On the same side.
+    pub shading_normal: DVec3,
+    pub object: u32,
+    pub material: &'a Material,
+}
+
+/// The point with the barycentric coordinates `u` and `v` of the second and the third corner.
+pub(super) fn surface_at(scene: &PackedScene, triangle: u32, u: f64, v: f64) -> Surface<'_> {
+    let triangle = &scene.shading_triangles[triangle as usize];
+    let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(xyz);
+    let geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
+    Surface {
+        position: p0 + u * (p1 - p0) + v * (p2 - p0),
+        geometric_normal,
+        shading_normal: interpolated_normal(triangle, u, v, geometric_normal),
+        object: triangle.object,
+        material: &scene.materials[triangle.material as usize],
+    }
+}
+
+fn interpolated_normal(triangle: &ShadingTriangle, u: f64, v: f64, geometric_normal: DVec3) -> DVec3 {
+    if triangle.smooth_shaded == 0 {
+        return geometric_normal;
+    }
+    let [n0, n1, n2] = [triangle.p0, triangle.p1, triangle.p2].map(|corner| decode_direction(word(corner)));
+    let n = (1.0 - u - v) * n0 + u * n1 + v * n2;
+    // Normals that cancel, or point to the back, say nothing.
+    if n.length_squared() > 1e-12 && n.dot(geometric_normal) > 0.0 {
+        n.normalize()
+    } else {
+        geometric_normal
+    }
+}
+
+/// Moves a ray's origin off its surface, to the side of `n`, by integer steps of the f32 grid: Wächter and Binder, «A
+/// Fast and Robust Method for Avoiding Self-Intersection», Ray Tracing Gems, chapter 6. The result is exact in f32.
+pub(super) fn offset_origin(position: DVec3, n: DVec3) -> DVec3 {
+    const NEAR_ORIGIN: f32 = 1.0 / 32.0;
+    const FLOAT_STEP: f64 = 1.0 / 65536.0;
+    const INT_STEP: f64 = 256.0;
+    let moved = |p: f64, n: f64| {
+        let rounded = p as f32;
+        if rounded.abs() < NEAR_ORIGIN {
+            return f64::from((f64::from(rounded) + FLOAT_STEP * n) as f32);
+        }
+        // The bits of a float grow with its magnitude.
+        let steps = (INT_STEP * n) as i32 * if rounded < 0.0 { -1 } else { 1 };
+        f64::from(f32::from_bits(rounded.to_bits().wrapping_add_signed(steps)))
+    };
+    DVec3::new(moved(position.x, n.x), moved(position.y, n.y), moved(position.z, n.z))
+}
+
+/// A ray's meeting with a surface, with both normals turned to the side that the ray comes from.
+pub(super) struct Facing {
+    pub geometric_normal: DVec3,
+    pub shading_normal: DVec3,
+    /// The ray meets the triangle's front.
+    pub front: bool,
+}
+
+impl Facing {
+    pub fn new(surface: &Surface<'_>, incoming: DVec3) -> Self {
+        let front = incoming.dot(surface.geometric_normal) < 0.0;
+        let side = if front { 1.0 } else { -1.0 };
+        let geometric_normal = side * surface.geometric_normal;
+        let shading_normal = side * surface.shading_normal;
+        Self {
+            geometric_normal,
+            // Past the shading normal's horizon the geometric normal stands in.
+            shading_normal: if incoming.dot(shading_normal) < 0.0 { shading_normal } else { geometric_normal },
+            front,
+        }
+    }
+
+    /// The incoming direction, mirrored.
+    pub fn reflect(&self, incoming: DVec3) -> DVec3 {
+        (incoming - 2.0 * incoming.dot(self.shading_normal) * self.shading_normal).normalize()
+    }
+
+    /// Where a ray starts that leaves `position` in `direction`: on the side that it flies to.
+    pub fn origin_towards(&self, position: DVec3, direction: DVec3) -> DVec3 {
+        let side = if direction.dot(self.geometric_normal) >= 0.0 { 1.0 } else { -1.0 };
+        offset_origin(position, side * self.geometric_normal)
+    }
+
+    /// Reflectance of a mirror with this base colour: Schlick's approximation, as glTF 2.0, appendix B, has it.
+    pub fn mirror_reflectance(&self, base_color: [f32; 3], incoming: DVec3) -> DVec3 {
+        let f0 = rgb(base_color);
+        let grazing = (1.0 + incoming.dot(self.shading_normal)).clamp(0.0, 1.0);
+        f0 + (1.0 - f0) * grazing.powi(5)
+    }
+}
+
+/// What can happen at a smooth dielectric boundary.
+pub(super) struct Boundary {
+    /// Share of the power that is reflected.
+    pub reflectance: f64,
+    /// Index of the incident side over that of the other side.
+    pub eta: f64,
+    pub reflected: DVec3,
+    /// `None` for total internal reflection.
+    pub refracted: Option<DVec3>,
+}
+
+impl Boundary {
+    /// Snell's law and Fresnel's equations for unpolarised light, between vacuum and an inside of index `ior`.
+    pub fn new(facing: &Facing, incoming: DVec3, ior: f32) -> Self {
+        let n = facing.shading_normal;
+        let (n_i, n_t) = if facing.front { (1.0, f64::from(ior)) } else { (f64::from(ior), 1.0) };
+        let eta = n_i / n_t;
+        let cos_i = -incoming.dot(n);
+        let sin2_t = eta * eta * (1.0 - cos_i * cos_i).max(0.0);
+        let reflected = facing.reflect(incoming);
+        if sin2_t >= 1.0 {
+            return Self {
+                reflectance: 1.0,
+                eta,
+                reflected,
+                refracted: None,
+            };
+        }
+        let cos_t = (1.0 - sin2_t).sqrt();
+        let r_parallel = (n_t * cos_i - n_i * cos_t) / (n_t * cos_i + n_i * cos_t);
+        let r_perpendicular = (n_i * cos_i - n_t * cos_t) / (n_i * cos_i + n_t * cos_t);
+        // The tangential part of the wave vector stays the same.
+        let tangential = eta * (incoming + cos_i * n);
+        Self {
+            reflectance: 0.5 * (r_parallel.powi(2) + r_perpendicular.powi(2)),
+            eta,
+            reflected,
+            refracted: Some((tangential - cos_t * n).normalize()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn facing(front: bool) -> Facing {
+        Facing {
+            geometric_normal: DVec3::Z,
+            shading_normal: DVec3::Z,
+            front,
+        }
+    }
+
+    fn incoming(angle: f64) -> DVec3 {
+        DVec3::new(angle.sin(), 0.0, -angle.cos())
+    }
+
+    #[test]
+    fn glass_reflects_four_percent_and_bends_by_snells_law() {
+        let boundary = Boundary::new(&facing(true), incoming(0.0), 1.5);
+        assert!((boundary.reflectance - 0.04).abs() < 1e-12);
+        let angle: f64 = 0.7;
+        let boundary = Boundary::new(&facing(true), incoming(angle), 1.5);
+        let refracted = boundary.refracted.expect("light enters the denser medium");
+        assert!((refracted.x - angle.sin() / 1.5).abs() < 1e-12 && refracted.z < 0.0);
+        assert!((boundary.reflected - DVec3::new(angle.sin(), 0.0, angle.cos())).length() < 1e-12);
+    }
+
+    #[test]
+    fn brewsters_angle_passes_all_parallel_light_and_beyond_the_critical_one_none_passes() {
+        let ior: f32 = 1.5;
+        let brewster = f64::from(ior).atan();
+        // r∥ = 0 there, r⊥ = cos²θ_i − sin²θ_i.
+        let expected = 0.5 * (brewster.cos().powi(2) - brewster.sin().powi(2)).powi(2);
+        assert!((Boundary::new(&facing(true), incoming(brewster), ior).reflectance - expected).abs() < 1e-12);
+        let critical = (1.0 / f64::from(ior)).asin();
+        assert!(Boundary::new(&facing(false), incoming(critical - 1e-6), ior).refracted.is_some());
+        let beyond = Boundary::new(&facing(false), incoming(critical + 1e-6), ior);
+        assert!(beyond.refracted.is_none() && beyond.reflectance == 1.0);
+    }
+
+    #[test]
+    fn offset_origins_lie_on_the_normals_side_and_near() {
+        for position in [DVec3::new(0.9, -0.4, 1e-3), DVec3::new(-1.0, 0.0, 0.03125)] {
+            for n in [DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.36, 0.48, -0.8)] {
+                let moved = offset_origin(position, n) - position;
+                assert!(moved.dot(n) > 0.0, "{moved} doesn't lead to the side of {n}");
+                assert!(moved.length() < 4e-5, "{moved} is far");
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! The statistics of the visible points.
+
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+
+use super::Counts;
+use super::vector::{from_two_float, from_two_floats, to_two_float, to_two_floats, word, xyz};
+use crate::layout::{Gathered, NO_OBJECT, RadiusSum, Statistics, VisiblePoint};
+
+/// Statistics before the first photon, with R² in square render units.
+pub fn reset(initial_radius2: f32) -> Statistics {
+    Statistics {
+        radius2_high: initial_radius2,
+        ..Statistics::zeroed()
+    }
+}
+
+/// Takes an iteration's photons into each slot's statistics (equations 2 and 3) and clears them for the next one.
+pub fn update(
+    visible_points: &[VisiblePoint],
+    alpha: f32,
+    counts: &Counts,
+    gathered: &mut [Gathered],
+    statistics: &mut [Statistics],
+) {
+    statistics.par_iter_mut().zip(gathered).zip(visible_points).for_each(|((statistics, gathered), point)| {
+        if word(point.position_object) == NO_OBJECT {
+            return;
+        }
+        let flux = xyz(point.weight_normal) * xyz(gathered.flux_count);
+        let new_photons = word(gathered.flux_count);
+        gathered.flux_count = [0.0; 4];
+        if !flux.is_finite() {
+            counts.add_non_finite(1);
+        } else if new_photons > 0 {
+            let alpha = f64::from(alpha);
+            let accepted = u64::from(statistics.accepted_low) | u64::from(statistics.accepted_high) << 32;
+            let (n, m) = (alpha * accepted as f64, f64::from(new_photons));
+            let ratio = (n + alpha * m) / (n + m);
+            let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low) * ratio;
+            let tau = (from_two_floats(statistics.flux_high, statistics.flux_low) + flux) * ratio;
+            let accepted = accepted + u64::from(new_photons);
+            (statistics.radius2_high, statistics.radius2_low) = to_two_float(radius2);
+            (statistics.flux_high, statistics.flux_low) = to_two_floats(tau);
+            (statistics.accepted_low, statistics.accepted_high) = (accepted as u32, (accepted >> 32) as u32);
+        }
+    });
+}
+
+/// The radii of each group of `group` slots, from which the device chooses the next grid.
+pub fn radius_sums(visible_points: &[VisiblePoint], statistics: &[Statistics], group: usize) -> Vec<RadiusSum> {
+    let groups = visible_points.chunks(group).zip(statistics.chunks(group));
+    let sum_up = |(points, statistics): (&[VisiblePoint], &[Statistics])| {
+        let (mut sum, mut largest, mut count) = (0.0, 0.0f32, 0);
+        for (point, statistics) in points.iter().zip(statistics) {
+            if word(point.position_object) != NO_OBJECT {
+                sum += f64::from(statistics.radius2_high).sqrt();
+                largest = largest.max(statistics.radius2_high);
+                count += 1;
+            }
+        }
+        RadiusSum {
+            radius: sum as f32,
+            radius2: largest,
+            count,
+            padding: 0,
+        }
+    };
+    groups.map(sum_up).collect()
+}

@@ -1,0 +1,224 @@
+//! What the stages took: the profile as a table, as JSON and as a Chrome trace.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use serde::Serialize;
+use serde_json::json;
+
+use crate::backend::{Counters, DeviceDescription};
+use crate::record::{Launch, Run};
+
+/// Every launch of a render, in order.
+#[derive(Debug, Default)]
+pub struct Profile {
+    runs: Vec<Run>,
+}
+
+/// What the launches of one stage took, in microseconds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StageProfile {
+    /// The stage.
+    pub stage: &'static str,
+    /// How often it ran.
+    pub launches: usize,
+    /// The shortest launch.
+    pub min_us: f64,
+    /// The median launch.
+    pub median_us: f64,
+    /// The launch that 95 % are not longer than.
+    pub p95_us: f64,
+    /// All launches together.
+    pub total_us: f64,
+    /// Part of all stages' time.
+    pub share: f64,
+}
+
+/// What a profile is about.
+#[derive(Debug, Clone, Serialize)]
+pub struct Subject {
+    /// The scene's name.
+    pub scene: String,
+    /// Pixels, width and height.
+    pub resolution: [u32; 2],
+    /// Gather method.
+    pub gather: String,
+    /// Photon paths of an iteration.
+    pub photons: u32,
+    /// Where it ran.
+    pub device: DeviceDescription,
+    /// What else happened.
+    pub counters: Counters,
+}
+
+impl Profile {
+    /// Adds an iteration.
+    pub fn add(&mut self, run: Run) {
+        self.runs.push(run);
+    }
+
+    /// Wall-clock time from each submission to its end, summed.
+    pub fn wall(&self) -> Duration {
+        self.runs.iter().map(|run| run.wall).sum()
+    }
+
+    /// The stages in the order of their first launch.
+    pub fn stages(&self) -> Vec<StageProfile> {
+        let mut durations: Vec<(&'static str, Vec<f64>)> = Vec::new();
+        for Launch { stage, duration_ns, .. } in self.runs.iter().flat_map(|run| &run.launches) {
+            let us = duration_ns * 1e-3;
+            match durations.iter_mut().find(|(name, _)| name == stage) {
+                Some((_, times)) => times.push(us),
+                None => durations.push((stage, vec![us])),
+            }
+        }
+        let all: f64 = durations.iter().flat_map(|(_, times)| times).sum();
+        durations
+            .into_iter()
+            .map(|(stage, mut times)| {
+                times.sort_by(f64::total_cmp);
+                let total_us: f64 = times.iter().sum();
+                StageProfile {
+                    stage,
+                    launches: times.len(),
+                    min_us: times[0],
+                    median_us: quantile(&times, 0.5),
+                    p95_us: quantile(&times, 0.95),
+                    total_us,
+                    share: total_us / all,
+                }
+            })
+            .collect()
+    }
+
+    /// A table of the stages for people.
+    pub fn table(&self, subject: &Subject) -> String {
+        let stages = self.stages();
+        let stages_us: f64 = stages.iter().map(|stage| stage.total_us).sum();
+        let wall_us = self.wall().as_secs_f64() * 1e6;
+        let [width, height] = subject.resolution;
+        let mut text = format!(
+            "{} at {width}x{height}, {} photon paths an iteration, gather {}\non {} ({}), timestamps of {} ns\n\n",
+            subject.scene,
+            subject.photons,
+            subject.gather,
+            subject.device.name,
+            subject.device.driver,
+            subject.device.timestamp_period_ns
+        );
+        let mut line = |cells: [&str; 7]| {
+            let [stage, launches, min, median, p95, total, share] = cells;
+            // Writing to a String can't fail.
+            let _ = writeln!(
+                text,
+                "{stage:<16} {launches:>8} {min:>12} {median:>12} {p95:>12} {total:>14} {share:>8}"
+            );
+        };
+        line(["stage", "launches", "min µs", "median µs", "p95 µs", "total µs", "share"]);
+        for stage in &stages {
+            line([
+                stage.stage,
+                &stage.launches.to_string(),
+                &format!("{:.1}", stage.min_us),
+                &format!("{:.1}", stage.median_us),
+                &format!("{:.1}", stage.p95_us),
+                &format!("{:.1}", stage.total_us),
+                &format!("{:.1} %", 100.0 * stage.share),
+            ]);
+        }
+        let _ = writeln!(
+            text,
+            "\nall stages {stages_us:.1} µs, submissions {wall_us:.1} µs of wall clock ({:.1} % of it in stages), {} iterations",
+            100.0 * stages_us / wall_us,
+            self.runs.len()
+        );
+        text
+    }
+
+    /// The same as JSON. Keys that end in `_us` are microseconds.
+    pub fn json(&self, subject: &Subject) -> serde_json::Value {
+        let stages = self.stages();
+        json!({
+            "subject": subject,
+            "iterations": self.runs.len(),
+            "stages_us": stages.iter().map(|stage| stage.total_us).sum::<f64>(),
+            "submissions_us": self.wall().as_secs_f64() * 1e6,
+            "stages": stages,
+        })
+    }
+
+    /// Every launch as an event of the Chrome trace format, which Perfetto reads too.
+    pub fn trace(&self, subject: &Subject) -> serde_json::Value {
+        let launches = || self.runs.iter().enumerate().flat_map(|(i, run)| run.launches.iter().map(move |l| (i, l)));
+        let origin = launches().map(|(_, launch)| launch.begin_ns).fold(f64::INFINITY, f64::min);
+        let events: Vec<_> = launches()
+            .map(|(iteration, launch)| {
+                json!({
+                    "name": launch.stage,
+                    "cat": "stage",
+                    "ph": "X",
+                    "ts": (launch.begin_ns - origin) * 1e-3,
+                    "dur": launch.duration_ns * 1e-3,
+                    "pid": 1,
+                    "tid": 1,
+                    "args": { "iteration": iteration },
+                })
+            })
+            .collect();
+        json!({ "traceEvents": events, "displayTimeUnit": "ns", "otherData": subject })
+    }
+}
+
+/// The value below which the part `q` of the sorted values lies.
+fn quantile(sorted: &[f64], q: f64) -> f64 {
+    let rank = (q * sorted.len() as f64).ceil() as usize;
+    sorted[rank.clamp(1, sorted.len()) - 1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn profile() -> Profile {
+        let mut profile = Profile::default();
+        for i in 1..=20u32 {
+            let launch = |stage, begin, us: u32| Launch {
+                stage,
+                begin_ns: f64::from(begin),
+                duration_ns: f64::from(us) * 1e3,
+            };
+            profile.add(Run {
+                launches: vec![launch("camera", i * 1000, i), launch("photons", i * 1000 + 500, 30)],
+                wall: Duration::from_micros(u64::from(i) + 30),
+            });
+        }
+        profile
+    }
+
+    #[test]
+    fn stages_have_their_order_statistics() {
+        let stages = profile().stages();
+        assert_eq!(stages.iter().map(|stage| stage.stage).collect::<Vec<_>>(), ["camera", "photons"]);
+        let camera = &stages[0];
+        assert_eq!((camera.launches, camera.min_us, camera.median_us, camera.p95_us), (20, 1.0, 10.0, 19.0));
+        assert_eq!(camera.total_us, 210.0);
+        assert!((camera.share - 210.0 / 810.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn trace_has_every_launch_from_time_zero() {
+        let subject = Subject {
+            scene: "s".into(),
+            resolution: [1, 1],
+            gather: "grid".into(),
+            photons: 1,
+            device: DeviceDescription { name: "d".into(), driver: "v".into(), timestamp_period_ns: 1.0 },
+            counters: Counters::default(),
+        };
+        let trace = profile().trace(&subject);
+        let events = trace["traceEvents"].as_array().expect("events");
+        assert_eq!(events.len(), 40);
+        assert_eq!(events[0]["ts"], 0.0);
+        assert_eq!(events[1]["dur"], 30.0);
+    }
+}

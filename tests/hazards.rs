@@ -1,0 +1,76 @@
+//! Barriers of recorded commands, checked without a device by an argument of their own: between two commands that touch
+//! the same buffer, one of them writing, there is a barrier.
+
+use ppm_vk::config::{DeviceLimits, RenderConfig, Sizes};
+use ppm_vk::gather::METHODS;
+use ppm_vk::pipeline::Stages;
+use ppm_vk::record::{Command, Recording};
+use ppm_vk::shaders;
+use ppm_vk::stage::{BufferId, StageDesc};
+
+/// Pairs of commands (by index) that conflict without a barrier between them.
+fn unprotected(commands: &[Command]) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for (first, earlier) in commands.iter().enumerate() {
+        for (second, later) in commands.iter().enumerate().skip(first + 1) {
+            if matches!(later, Command::Barrier) {
+                break;
+            }
+            let conflict = earlier.touches().iter().any(|(buffer, writes)| {
+                later.touches().iter().any(|(other, other_writes)| buffer == other && (*writes || *other_writes))
+            });
+            if conflict {
+                pairs.push((first, second));
+            }
+        }
+    }
+    pairs
+}
+
+fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording)> {
+    let mut recordings = Vec::new();
+    for (index, method) in METHODS.iter().enumerate() {
+        let config = RenderConfig { resolution: [320, 280], gather: index, photons, ..RenderConfig::default() };
+        let limits = DeviceLimits { storage_buffer_bytes, loop_limit: u32::MAX, lanes: 4096 };
+        let sizes = Sizes::new(&config, limits);
+        let stages = Stages { config: &config, sizes: &sizes };
+        recordings.push((method.name.to_owned(), stages.iteration(1)));
+    }
+    recordings
+}
+
+#[test]
+fn no_command_of_an_iteration_races_with_another() {
+    for (method, recording) in iterations(100_000, 128 << 20) {
+        let pairs = unprotected(recording.commands());
+        assert!(pairs.is_empty(), "{method}: commands {pairs:?} touch one buffer without a barrier between them");
+    }
+}
+
+#[test]
+fn no_command_races_where_an_iteration_is_done_in_batches() {
+    for (method, recording) in iterations(3_000_000, 16 << 20) {
+        let pairs = unprotected(recording.commands());
+        assert!(pairs.is_empty(), "{method}: commands {pairs:?} touch one buffer without a barrier between them");
+    }
+}
+
+#[test]
+fn a_missing_barrier_is_found() {
+    let (_, recording) = iterations(100_000, 128 << 20).pop().expect("a method");
+    let barriers = recording.commands().iter().filter(|command| matches!(command, Command::Barrier)).count();
+    assert!(barriers > 5, "{barriers} barriers in an iteration");
+    let without: Vec<Command> =
+        recording.commands().iter().filter(|command| !matches!(command, Command::Barrier)).cloned().collect();
+    assert!(!unprotected(&without).is_empty(), "the check passes without any barrier: it checks nothing");
+}
+
+#[test]
+fn stages_that_share_no_written_buffer_run_without_a_barrier() {
+    let mut recording = Recording::new();
+    recording.fill(BufferId::Status, 0);
+    recording.fill(BufferId::DirectSums, 0);
+    assert_eq!(recording.commands().len(), 2);
+    recording.dispatch(StageDesc::new(&shaders::DIRECT, 64));
+    assert_eq!(recording.commands().len(), 4, "a write before a read needs one barrier");
+}

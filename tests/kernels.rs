@@ -1,0 +1,21 @@
+//! The kernels against the CPU's stages (`src/cpu`), on the best Vulkan device of the machine. In debug builds a message
+//! of the validation layer fails a test as well.
+
+#[path = "kernels/agreement.rs"]
+mod agreement;
+#[path = "kernels/bench.rs"]
+mod bench;
+#[path = "kernels/gather.rs"]
+mod gather;
+#[path = "kernels/oracle.rs"]
+mod oracle;
+#[path = "kernels/photons.rs"]
+mod photons;
+#[path = "kernels/pictures.rs"]
+mod pictures;
+#[path = "kernels/primitives.rs"]
+mod primitives;
+#[path = "kernels/statistics.rs"]
+mod statistics;
+#[path = "kernels/visible_points.rs"]
+mod visible_points;

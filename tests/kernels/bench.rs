@@ -1,0 +1,125 @@
+//! A scene on the device, whose buffers are read and written between stages.
+
+use std::path::Path;
+
+use glam::DVec3;
+use ppm_vk::config::RenderConfig;
+use ppm_vk::cpu;
+use ppm_vk::gpu::Device;
+use ppm_vk::layout::{NO_OBJECT, Photon, Settings, VisiblePoint};
+use ppm_vk::pipeline::Renderer;
+use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::stage::BufferId;
+
+/// A scene of `scenes/`.
+pub fn scene(name: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("gltf");
+    Scene::load(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A scene in the device's layout.
+pub fn packed(scene: &Scene) -> PackedScene {
+    PackedScene::new(scene).unwrap_or_else(|error| panic!("{}: {error}", scene.name))
+}
+
+/// Small enough for a CPU device, large enough for statistics.
+pub fn small() -> RenderConfig {
+    RenderConfig {
+        resolution: [64, 64],
+        photons: 5000,
+        ..RenderConfig::default()
+    }
+}
+
+/// A scene, and a renderer for it that has done one iteration.
+pub struct Bench {
+    pub scene: PackedScene,
+    pub config: RenderConfig,
+    pub settings: Settings,
+    pub renderer: Renderer,
+}
+
+impl Bench {
+    pub fn new(name: &str, config: RenderConfig) -> Self {
+        let loaded = scene(name);
+        let scene = packed(&loaded);
+        let device = Device::open(None).expect("a Vulkan device");
+        let mut renderer = Renderer::new(device, &scene, &loaded.cameras[0], config.clone()).expect("a renderer");
+        renderer.iterate().expect("an iteration");
+        let settings = download(&mut renderer, BufferId::Settings)[0];
+        Self {
+            scene,
+            config,
+            settings,
+            renderer,
+        }
+    }
+
+    /// What the CPU's stages read.
+    pub fn inputs(&self) -> cpu::Inputs<'_> {
+        cpu::Inputs {
+            scene: &self.scene,
+            settings: &self.settings,
+            config: &self.config,
+        }
+    }
+
+    /// What a buffer of the device holds.
+    pub fn download<T: bytemuck::AnyBitPattern>(&mut self, id: BufferId) -> Vec<T> {
+        download(&mut self.renderer, id)
+    }
+
+    /// Makes a buffer of the device hold this.
+    pub fn upload<T: bytemuck::NoUninit>(&mut self, id: BufferId, data: &[T]) {
+        self.renderer.device().upload(id, data).unwrap_or_else(|error| panic!("{id:?}: {error}"));
+    }
+
+    /// The photons of the last batch.
+    pub fn photons(&mut self) -> Vec<Photon> {
+        let count: Vec<u32> = self.download(BufferId::PhotonCount);
+        let mut photons = self.download(BufferId::Photons);
+        photons.truncate(count[0] as usize);
+        photons
+    }
+}
+
+fn download<T: bytemuck::AnyBitPattern>(renderer: &mut Renderer, id: BufferId) -> Vec<T> {
+    renderer.device().download(id, None).unwrap_or_else(|error| panic!("{id:?}: {error}"))
+}
+
+/// The first three of four, in f64.
+pub fn xyz(v: [f32; 4]) -> DVec3 {
+    DVec3::new(v[0].into(), v[1].into(), v[2].into())
+}
+
+/// The object of a visible point or a photon, `None` for a visible point on no matte surface.
+pub fn object(position_object: [f32; 4]) -> Option<u32> {
+    let object = position_object[3].to_bits();
+    (object != NO_OBJECT).then_some(object)
+}
+
+/// A visible point of albedo π on an object, seen from +z.
+pub fn visible_point(position: [f32; 3], object: u32) -> VisiblePoint {
+    let normal = f32::from_bits(cpu::encode_direction(DVec3::Z));
+    let [x, y, z] = position;
+    VisiblePoint {
+        position_object: [x, y, z, f32::from_bits(object)],
+        weight_normal: [1.0, 1.0, 1.0, normal],
+        emitted_normal: [0.0, 0.0, 0.0, normal],
+    }
+}
+
+/// A photon that arrives from +z.
+pub fn photon(position: [f32; 3], object: u32, flux: [f32; 3]) -> Photon {
+    let direction = f32::from_bits(cpu::encode_direction(DVec3::NEG_Z));
+    let ([x, y, z], [r, g, b]) = (position, flux);
+    Photon {
+        position_object: [x, y, z, f32::from_bits(object)],
+        flux_direction: [r, g, b, direction],
+    }
+}
+
+/// `count` numbers in [0, 1) in sets of four, the same in every run.
+pub fn random_numbers(count: u32) -> impl Iterator<Item = [f32; 4]> {
+    (0..count).map(|i| cpu::Random::new(cpu::PathKind::Camera, i, 0, 0xbe9c).next4().map(|number| number as f32))
+}

@@ -1,0 +1,204 @@
+//! The gather methods: every one finds the same photons, N and M exactly, as testing each photon on the CPU.
+
+use ppm_vk::config::RenderConfig;
+use ppm_vk::cpu::{self, Counts};
+use ppm_vk::gather::METHODS;
+use ppm_vk::layout::{Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::record::Recording;
+use ppm_vk::shaders;
+use ppm_vk::stage::{BufferId, StageDesc};
+
+use super::agreement::relative_difference;
+use super::bench::{Bench, photon, random_numbers, small, visible_point, xyz};
+
+/// Radii for all visible points.
+fn with_radius(count: usize, radius2: f32) -> Vec<Statistics> {
+    vec![cpu::reset(radius2); count]
+}
+
+/// M of each slot.
+fn counts(gathered: &[Gathered]) -> Vec<u32> {
+    gathered.iter().map(|gathered| gathered.flux_count[3].to_bits()).collect()
+}
+
+/// Gathers with every method on the device, updates the statistics, and compares both with the CPU's. Returns M.
+fn assert_methods_agree(
+    bench: &mut Bench,
+    case: &str,
+    points: &[VisiblePoint],
+    statistics: &[Statistics],
+    photons: &[Photon],
+) -> Vec<u32> {
+    assert_eq!(points.len(), bench.renderer.sizes().slots() as usize, "one visible point a slot");
+    assert!(photons.len() <= bench.renderer.sizes().photon_capacity() as usize, "more photons than the buffers hold");
+    let mut expected = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
+    cpu::gather_naive(points, statistics, photons, &mut expected);
+    let mut updated = statistics.to_vec();
+    cpu::update(points, bench.config.alpha, &Counts::default(), &mut expected.clone(), &mut updated);
+
+    bench.upload(BufferId::VisiblePoints, points);
+    bench.upload(BufferId::Photons, photons);
+    bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);
+    let radius_sums = cpu::radius_sums(points, statistics, shaders::UPDATE.workgroup as usize);
+    for method in METHODS {
+        let what = format!("{case}, {}", method.name);
+        bench.upload(BufferId::StatisticsOf, statistics);
+        bench.upload(BufferId::RadiusSums, &radius_sums);
+        let mut recording = Recording::new();
+        recording.fill(BufferId::GatheredOf, 0);
+        (method.record)(bench.renderer.sizes(), &mut recording);
+        bench.renderer.device().run(&recording).unwrap_or_else(|error| panic!("{what}: {error}"));
+        let found: Vec<Gathered> = bench.download(BufferId::GatheredOf);
+        assert_same_photons(&what, &found, &expected);
+
+        let mut recording = Recording::new();
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, points.len() as u32));
+        bench.renderer.device().run(&recording).unwrap_or_else(|error| panic!("{what}: {error}"));
+        let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+        assert_same_statistics(&what, &found, &updated);
+    }
+    counts(&expected)
+}
+
+fn assert_same_photons(what: &str, found: &[Gathered], expected: &[Gathered]) {
+    for (slot, (found, expected)) in counts(found).iter().zip(counts(expected)).enumerate() {
+        assert_eq!(*found, expected, "{what}, slot {slot}: M on the device, M on the CPU");
+    }
+}
+
+fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[Statistics]) {
+    for (slot, (found, expected)) in found.iter().zip(expected).enumerate() {
+        let accepted = |s: &Statistics| (s.accepted_low, s.accepted_high);
+        assert_eq!(accepted(found), accepted(expected), "{what}, slot {slot}: photons accepted");
+        // Sums of f32, added up in another order: √M roundings.
+        let (tau, expected_tau) = (xyz(found.flux_high), xyz(expected.flux_high));
+        for (tau, expected) in tau.to_array().into_iter().zip(expected_tau.to_array()) {
+            let difference = relative_difference(tau, expected);
+            assert!(difference <= 1e-5, "{what}, slot {slot}: τ {tau} on the device, {expected} on the CPU");
+        }
+    }
+}
+
+#[test]
+fn all_methods_agree_on_traced_photons_at_any_radius() {
+    let mut bench = Bench::new("cornell-spheres", small());
+    let (points, photons): (Vec<VisiblePoint>, _) = (bench.download(BufferId::VisiblePoints), bench.photons());
+    let radius2 = bench.settings.initial_radius2;
+    let mut means = Vec::new();
+    for factor in [0.25f32, 1.0, 4.0] {
+        let statistics = with_radius(points.len(), radius2 * factor * factor);
+        let case = format!("{} photons, {factor} times the automatic radius", photons.len());
+        let m = assert_methods_agree(&mut bench, &case, &points, &statistics, &photons);
+        means.push(m.iter().map(|&m| f64::from(m)).sum::<f64>() / m.len() as f64);
+    }
+    // The radius is chosen for ten photons.
+    println!("mean M at a quarter of, at, and at four times the automatic radius: {means:?}");
+    assert!(means[1] > 5.0 && means[1] < 20.0, "mean M {means:?}");
+    assert!(means[0] < means[1] && means[1] < means[2], "mean M {means:?}");
+}
+
+#[test]
+fn all_methods_agree_where_radii_differ() {
+    let mut bench = Bench::new("cornell-spheres", small());
+    let (points, photons): (Vec<VisiblePoint>, _) = (bench.download(BufferId::VisiblePoints), bench.photons());
+    let radius = bench.settings.initial_radius2.sqrt();
+    let statistics: Vec<Statistics> = random_numbers(points.len() as u32)
+        .map(|[u, ..]| cpu::reset((radius * 4f32.powf(2.0 * u - 1.0)).powi(2)))
+        .collect();
+    assert_methods_agree(&mut bench, "radii from a quarter to four times", &points, &statistics, &photons);
+}
+
+/// 8×8 visible points, room for more than 65,535 photons.
+fn tiny() -> RenderConfig {
+    RenderConfig {
+        resolution: [8, 8],
+        photons: 20_000,
+        radius: Some(0.1),
+        ..small()
+    }
+}
+
+/// A visible point for each slot, on object 0 in the plane z = 0.
+fn plane(bench: &Bench) -> Vec<VisiblePoint> {
+    let slots = bench.renderer.sizes().slots();
+    random_numbers(slots).map(|[x, y, ..]| visible_point([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], 0)).collect()
+}
+
+#[test]
+fn no_photon_and_one_photon_are_gathered() {
+    let mut bench = Bench::new("cornell", tiny());
+    let points = plane(&bench);
+    let statistics = with_radius(points.len(), 0.25);
+    let m = assert_methods_agree(&mut bench, "no photon", &points, &statistics, &[]);
+    assert!(m.iter().all(|&m| m == 0));
+    let photons = [photon([0.1, 0.2, 0.0], 0, [1.0, 2.0, 3.0])];
+    let m = assert_methods_agree(&mut bench, "one photon", &points, &statistics, &photons);
+    assert!(m.contains(&0) && m.contains(&1), "{m:?}");
+}
+
+#[test]
+fn a_photon_at_distance_r_counts_and_the_next_one_beyond_does_not() {
+    let mut bench = Bench::new("cornell", tiny());
+    // Coordinates are multiples of 2⁻²⁰ and 5² = 4² + 3²: f32 holds all distances exactly. Each visible point has an
+    // object of its own.
+    let grid = |u: f32| ((2.0 * u - 1.0) * 512.0).round() / 1024.0;
+    let radius = 5.0f32 / 64.0;
+    let (mut points, mut photons) = (Vec::new(), Vec::new());
+    for (slot, [x, y, z, _]) in (0..).zip(random_numbers(64)) {
+        let [x, y, z] = [grid(x), grid(y), grid(z)];
+        points.push(visible_point([x, y, z], slot));
+        let flux = [1.0; 3];
+        for (dx, dy, dz) in [(5.0, 0.0, 0.0), (-5.0, 0.0, 0.0), (0.0, 4.0, -3.0), (-3.0, 0.0, 4.0), (-4.0, -3.0, 0.0)] {
+            let [dx, dy, dz]: [f32; 3] = [dx / 64.0, dy / 64.0, dz / 64.0];
+            photons.push(photon([x + dx, y + dy, z + dz], slot, flux));
+        }
+        // A millionth farther, on either side.
+        let beyond = radius + 1.0 / 1_048_576.0;
+        photons.extend([x + beyond, x - beyond].map(|farther| photon([farther, y, z], slot, flux)));
+    }
+    let statistics = with_radius(points.len(), radius * radius);
+    let m = assert_methods_agree(&mut bench, "photons at distance R", &points, &statistics, &photons);
+    assert_eq!(m, vec![5; 64], "five photons lie at R, two just beyond");
+}
+
+#[test]
+fn photons_of_another_object_or_from_behind_do_not_count() {
+    let mut bench = Bench::new("cornell", tiny());
+    let points = plane(&bench);
+    let statistics = with_radius(points.len(), 9.0);
+    let from_behind = |mut photon: Photon| {
+        photon.flux_direction[3] = f32::from_bits(cpu::encode_direction(glam::DVec3::Z));
+        photon
+    };
+    let here = photon([0.0; 3], 0, [1.0; 3]);
+    let photons = [here, photon([0.0; 3], 1, [1.0; 3]), from_behind(here)];
+    let m = assert_methods_agree(&mut bench, "one of three photons", &points, &statistics, &photons);
+    assert_eq!(m, vec![1; 64]);
+}
+
+#[test]
+fn photons_that_lie_in_one_cell_are_all_found() {
+    let mut bench = Bench::new("cornell", tiny());
+    let points = plane(&bench);
+    // Cells are as large as the radii: 4,099 photons, a prime, within a thousandth of one.
+    let photons: Vec<Photon> = random_numbers(4099)
+        .map(|[x, y, r, g]| photon([0.3 + 1e-4 * x, -0.2 + 1e-4 * y, 0.0], 0, [r, g, 1.0]))
+        .collect();
+    let statistics = with_radius(points.len(), 0.16);
+    let m = assert_methods_agree(&mut bench, "photons in one cell", &points, &statistics, &photons);
+    assert!(m.contains(&0) && m.contains(&4099), "{m:?}");
+}
+
+#[test]
+fn more_photons_than_a_loop_may_test_are_all_tested() {
+    // Some drivers end an invocation's loops at 65,535 iterations, without a word. A prime again, so that no range or
+    // block is full.
+    let mut bench = Bench::new("cornell", tiny());
+    let points = plane(&bench);
+    let photons: Vec<Photon> = random_numbers(70_001)
+        .map(|[x, y, r, g]| photon([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], 0, [r, g, 0.5]))
+        .collect();
+    let statistics = with_radius(points.len(), 9.0);
+    let m = assert_methods_agree(&mut bench, "70,001 photons within R", &points, &statistics, &photons);
+    assert_eq!(m, vec![70_001; 64]);
+}

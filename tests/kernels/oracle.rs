@@ -1,0 +1,145 @@
+//! The CPU's stages against each other and against what is known.
+
+use glam::DVec3;
+use ppm_vk::config::{Accel, Direct, Estimator, RenderConfig};
+use ppm_vk::cpu::{self, Batch, Counts, Inputs, Ray, Renderer};
+use ppm_vk::film::Image;
+use ppm_vk::layout::{Gathered, Settings};
+use ppm_vk::metrics;
+use ppm_vk::scene::PackedScene;
+
+use super::bench::{packed, random_numbers, scene, small};
+
+fn inputs<'a>(scene: &'a PackedScene, settings: &'a Settings, config: &'a RenderConfig) -> Inputs<'a> {
+    Inputs {
+        scene,
+        settings,
+        config,
+    }
+}
+
+/// Rays from near the centre of the scene in all directions.
+fn rays(count: u32) -> impl Iterator<Item = Ray> {
+    random_numbers(count).map(|[x, y, u, v]| {
+        let (z, phi) = (2.0 * f64::from(u) - 1.0, std::f64::consts::TAU * f64::from(v));
+        let r = (1.0 - z * z).sqrt();
+        Ray {
+            origin: DVec3::new(f64::from(x) - 0.5, f64::from(y) - 0.5, 0.1) * 0.5,
+            direction: DVec3::new(r * phi.cos(), r * phi.sin(), z),
+        }
+    })
+}
+
+#[test]
+fn the_hierarchy_finds_the_hits_that_testing_every_triangle_finds() {
+    let settings: Settings = bytemuck::Zeroable::zeroed();
+    let with_bvh = small();
+    let without = RenderConfig {
+        accel: Accel::Brute,
+        ..small()
+    };
+    for name in ["cornell-spheres", "pool", "ring"] {
+        let scene = packed(&scene(name));
+        let (bvh, brute) = (inputs(&scene, &settings, &with_bvh), inputs(&scene, &settings, &without));
+        let mut hits = 0;
+        for ray in rays(1000) {
+            let (found, expected) = (cpu::nearest_hit(&bvh, ray, 1e30, None), cpu::nearest_hit(&brute, ray, 1e30, None));
+            assert_eq!(found.map(|hit| hit.t), expected.map(|hit| hit.t), "{name}: {ray:?}");
+            if let Some(hit) = expected {
+                hits += 1;
+                for limit in [0.5 * hit.t, hit.t, 1.5 * hit.t] {
+                    let blocked = cpu::is_blocked(&bvh, ray, limit, None);
+                    assert_eq!(blocked, cpu::is_blocked(&brute, ray, limit, None), "{name}: {ray:?} before {limit}");
+                    assert_eq!(blocked, limit > hit.t, "{name}: {ray:?} before {limit}");
+                }
+            }
+        }
+        assert!(hits > 300, "{name}: only {hits} of 1000 rays hit something");
+    }
+}
+
+#[test]
+fn no_ray_leaves_a_closed_room() {
+    let scene = packed(&scene("furnace-closed"));
+    let settings: Settings = bytemuck::Zeroable::zeroed();
+    let config = small();
+    for ray in rays(20_000) {
+        assert!(cpu::nearest_hit(&inputs(&scene, &settings, &config), ray, 1e30, None).is_some(), "{ray:?}");
+    }
+}
+
+#[test]
+fn the_kd_tree_finds_what_testing_every_photon_finds() {
+    let scene = packed(&scene("cornell-spheres"));
+    let loaded = super::bench::scene("cornell-spheres");
+    let config = small();
+    let renderer = Renderer::new(&scene, &loaded.cameras[0], config.clone()).expect("a renderer");
+    let inputs = inputs(&scene, renderer.settings(), &config);
+    let counts = Counts::default();
+    let points = cpu::camera(&inputs, 0, &counts);
+    let batch = Batch {
+        iteration: 0,
+        first_path: 0,
+        paths: config.photons,
+    };
+    let photons = cpu::compact(&cpu::photons(&inputs, batch, &counts));
+    for radius in [0.2, 1.0, 5.0] {
+        let statistics = vec![cpu::reset((radius * renderer.radius()).powi(2)); points.len()];
+        let nothing = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
+        let (mut found, mut expected) = (nothing.clone(), nothing);
+        cpu::gather_kd_tree(&points, &statistics, &photons, &mut found).expect("few photons");
+        cpu::gather_naive(&points, &statistics, &photons, &mut expected);
+        let differing = found.iter().zip(&expected).position(|(a, b)| bytemuck::bytes_of(a) != bytemuck::bytes_of(b));
+        assert_eq!(differing, None, "slot that differs at {radius} times the automatic radius");
+    }
+}
+
+fn render(name: &str, config: RenderConfig, iterations: u32) -> Image {
+    let loaded = scene(name);
+    let scene = packed(&loaded);
+    let mut renderer = Renderer::new(&scene, &loaded.cameras[0], config).expect("a renderer");
+    for _ in 0..iterations {
+        renderer.iterate().expect("an iteration");
+    }
+    assert_eq!(renderer.counters().non_finite, 0, "{name}");
+    renderer.resolve().expect("a picture")
+}
+
+#[test]
+fn one_seed_gives_the_same_bits_whatever_the_number_of_threads() {
+    let with_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| render("cornell-spheres", small(), 2))
+    };
+    let (one, three) = (with_threads(1), with_threads(3));
+    assert_eq!(one.pixels(), three.pixels());
+    let other_seed = RenderConfig {
+        seed: 1,
+        ..small()
+    };
+    assert_ne!(one.pixels(), render("cornell-spheres", other_seed, 2).pixels());
+}
+
+#[test]
+fn a_closed_furnace_shines_with_emission_over_one_minus_albedo() {
+    // Le = (1, 0.5, 0.25), ρ = (0.2, 0.5, 0.8).
+    let expected = [1.25, 1.0, 1.25];
+    for (estimator, direct, iterations) in
+        [(Estimator::Sppm, Direct::Light, 8), (Estimator::Sppm, Direct::Photons, 8), (Estimator::Ppm, Direct::Light, 8)]
+    {
+        let config = RenderConfig {
+            estimator,
+            direct,
+            resolution: [32, 32],
+            photons: 20_000,
+            ..small()
+        };
+        let mean = metrics::mean(&render("furnace-closed", config, iterations));
+        println!("{estimator:?}, direct light from {direct:?}: {mean:?}");
+        for channel in 0..3 {
+            let ratio = mean[channel] / expected[channel];
+            // 160,000 photon paths: noise of a few thousandths.
+            assert!((ratio - 1.0).abs() < 0.01, "{estimator:?}, {direct:?}: {mean:?}, {expected:?} expected");
+        }
+    }
+}

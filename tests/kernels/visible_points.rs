@@ -1,0 +1,161 @@
+//! The stages `camera` and `direct`.
+//!
+//! Tolerances: the kernels compute in f32, whose rounding (6e-8 of the coordinates, which lie within ±1) the ray's
+//! length and slope multiply a few times on flat surfaces; a sphere multiplies it by distance over radius at each
+//! bounce. Where a ray passes an edge, or a random number lies next to a reflectance, rounding makes it take another
+//! way: those are the few that may differ.
+
+use ppm_vk::config::{Direct, Estimator, RenderConfig};
+use ppm_vk::cpu::{self, Counts};
+use ppm_vk::layout::{DirectSum, Light, VisiblePoint};
+use ppm_vk::record::Recording;
+use ppm_vk::shaders;
+use ppm_vk::stage::{BufferId, StageDesc};
+
+use super::agreement::{Agreement, relative_difference};
+use super::bench::{Bench, object, small, xyz};
+
+/// Angle between two encoded directions, rad.
+fn angle(a: f32, b: f32) -> f64 {
+    cpu::decode_direction(a.to_bits()).angle_between(cpu::decode_direction(b.to_bits()))
+}
+
+fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize) {
+    let what = format!("visible points of {name}, {:?}", config.estimator);
+    let mut bench = Bench::new(name, config);
+    let found: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
+    let counts = Counts::default();
+    let expected = cpu::camera(&bench.inputs(), 0, &counts);
+    assert_eq!(found.len(), expected.len(), "{what}: slots");
+    let (mut places, mut seen) = (Agreement::default(), Agreement::default());
+    for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        let objects = (object(found.position_object), object(expected.position_object));
+        let distance = xyz(found.position_object).distance(xyz(expected.position_object));
+        places.note(objects.0 == objects.1 && distance < 2e-5, || {
+            format!("slot {slot}: objects {objects:?}, {distance:e} apart (device, CPU)")
+        });
+        if objects.0.is_some() && objects.0 == objects.1 && distance < 2e-5 {
+            let (weight, expected_weight) = (xyz(found.weight_normal), xyz(expected.weight_normal));
+            let emitted = (xyz(found.emitted_normal), xyz(expected.emitted_normal));
+            // Octahedral steps are 4e-5 rad wide.
+            let turned = angle(found.weight_normal[3], expected.weight_normal[3])
+                .max(angle(found.emitted_normal[3], expected.emitted_normal[3]));
+            let same = weight.distance(expected_weight) <= 1e-5 * expected_weight.length()
+                && emitted.0.distance(emitted.1) <= 1e-5 * emitted.1.length()
+                && turned < 1e-4;
+            seen.note(same, || {
+                format!("slot {slot}: weights {weight} {expected_weight}, emitted {emitted:?}, normals {turned:e} rad apart")
+            });
+        }
+    }
+    places.assert(&what, 0.999, found.len());
+    seen.assert(&format!("weights and normals of the {what}"), 0.999, least_seen);
+}
+
+#[test]
+fn camera_paths_end_where_the_cpus_end() {
+    for name in ["cornell-spheres", "ring"] {
+        assert_camera_agrees(name, small(), 3000);
+    }
+}
+
+#[test]
+fn camera_paths_that_split_at_glass_fill_the_same_slots() {
+    for (name, least_seen) in [("cornell-spheres", 4000), ("pool", 3000)] {
+        let config = RenderConfig {
+            estimator: Estimator::Ppm,
+            ..small()
+        };
+        assert_camera_agrees(name, config, least_seen);
+    }
+}
+
+#[test]
+fn a_picture_that_cuts_its_tiles_fills_the_same_slots() {
+    let config = RenderConfig {
+        resolution: [51, 29],
+        ..small()
+    };
+    assert_camera_agrees("cornell", config, 1400);
+}
+
+/// Runs the stage `direct` over cleared sums; returns the radiance of each slot.
+fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
+    let mut recording = Recording::new();
+    recording.fill(BufferId::DirectSums, 0);
+    let slots = bench.renderer.sizes().slots();
+    let constants = vec![("SAMPLE_LIGHTS", u32::from(bench.config.direct == Direct::Light))];
+    recording.dispatch(StageDesc::new(&shaders::DIRECT, slots).constants(constants).push(0u32));
+    bench.renderer.device().run(&recording).expect("a run");
+    bench.download(BufferId::DirectSums)
+}
+
+/// How the device's radiance agrees with the CPU's at the very same visible points.
+fn compare_direct(bench: &mut Bench, tolerance: f64) -> Agreement {
+    let visible_points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
+    let found = direct_on_device(bench);
+    let mut expected = vec![DirectSum { high: [0.0; 4], low: [0.0; 4] }; visible_points.len()];
+    cpu::direct(&bench.inputs(), 0, &visible_points, &Counts::default(), &mut expected);
+    let mut agreement = Agreement::default();
+    for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        let (found, expected) = (xyz(found.high) + xyz(found.low), xyz(expected.high) + xyz(expected.low));
+        if found.length() > 0.0 || expected.length() > 0.0 {
+            let difference = relative_difference(found.element_sum(), expected.element_sum());
+            agreement.note(difference < tolerance, || format!("slot {slot}: {found} on the device, {expected} on the CPU"));
+        }
+    }
+    agreement
+}
+
+#[test]
+fn direct_light_agrees_at_the_same_visible_points() {
+    for (name, least) in [("cornell-spheres", 2500), ("ring", 2000), ("furnace-closed", 4000)] {
+        let mut bench = Bench::new(name, small());
+        // Light that grazes a surface has a cosine of which rounding is a larger part.
+        compare_direct(&mut bench, 1e-4).assert(&format!("direct light in {name}"), 0.995, least);
+    }
+}
+
+#[test]
+fn light_that_is_seen_directly_agrees_without_sampling() {
+    let config = RenderConfig {
+        direct: Direct::Photons,
+        ..small()
+    };
+    let mut bench = Bench::new("furnace-closed", config);
+    compare_direct(&mut bench, 1e-6).assert("emitted light in furnace-closed", 1.0, 4000);
+}
+
+#[test]
+fn random_numbers_are_the_same_to_the_last_bit() {
+    // Each visible point chooses a light by its number u. With the lights' cumulative probabilities at u and at the
+    // next number above, one bit more or less chooses another light; the radiance, in proportion to the light's area,
+    // tells which one it was. The emitter is the same triangle for all.
+    let mut bench = Bench::new("light-area", small());
+    let points = bench.settings.resolution[0] * bench.settings.resolution[1];
+    let step = 1.0 / f64::from(1 << 24);
+    let mut thresholds: Vec<f64> = (0..points)
+        .map(|slot| cpu::Random::new(cpu::PathKind::LightSample, slot, 0, bench.settings.seed).next4()[0])
+        .flat_map(|u| [u, u + step])
+        .chain([1.0])
+        .collect();
+    thresholds.sort_by(f64::total_cmp);
+    thresholds.dedup();
+    let lights: Vec<Light> = thresholds
+        .iter()
+        .enumerate()
+        .map(|(i, &cumulative)| Light {
+            triangle: bench.scene.lights[0].triangle,
+            cumulative: cumulative as f32,
+            probability: 1.0,
+            area: 1.0 + i as f32,
+        })
+        .collect();
+    bench.settings.light_count = lights.len() as u32;
+    let settings = bench.settings;
+    bench.upload(BufferId::Settings, &[settings]);
+    bench.upload(BufferId::Lights, &lights);
+    // Two neighbouring lights of 8,193 differ by 1.2e-4 of their area at the least.
+    bench.scene.lights = lights;
+    compare_direct(&mut bench, 6e-5).assert("choices that hang on the last bit", 0.999, 500);
+}
