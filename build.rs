@@ -30,7 +30,11 @@ fn main() -> Result<()> {
     let mut module = String::new();
     let mut names = Vec::new();
     for source in &sources {
-        let name = source.file_stem().and_then(|stem| stem.to_str()).context("stage's file name")?.to_owned();
+        let name = source
+            .file_stem()
+            .and_then(|stem| stem.to_str())
+            .context("stage's file name")?
+            .to_owned();
         let named = compile(&compiler, source, &root, shaderc::OptimizationLevel::Zero)?;
         let optimised = compile(&compiler, source, &root, shaderc::OptimizationLevel::Performance)?;
         fs::write(out.join(format!("{name}.spv")), optimised.as_binary_u8())?;
@@ -39,9 +43,17 @@ fn main() -> Result<()> {
         describe(&mut module, &name, &entry_point).with_context(|| source.display().to_string())?;
         names.push(name.to_uppercase());
     }
-    writeln!(module, "/// Every stage's shader.\npub static ALL: &[&Shader] = &[{}];", {
-        names.iter().map(|name| format!("&{name}")).collect::<Vec<_>>().join(", ")
-    })?;
+    writeln!(
+        module,
+        "/// Every stage's shader.\npub static ALL: &[&Shader] = &[{}];",
+        {
+            names
+                .iter()
+                .map(|name| format!("&{name}"))
+                .collect::<Vec<_>>()
+                .join(", ")
+        }
+    )?;
     fs::write(out.join("shaders.rs"), module)?;
     Ok(())
 }
@@ -60,7 +72,10 @@ fn compile(
     options.set_include_callback(|name, _, _, _| {
         let path = root.join("glsl/shared").join(name);
         let content = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
-        Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
+        Ok(shaderc::ResolvedInclude {
+            resolved_name: path.display().to_string(),
+            content,
+        })
     });
     let text = fs::read_to_string(source)?;
     let file = source.strip_prefix(root)?.display().to_string();
@@ -68,9 +83,16 @@ fn compile(
 }
 
 fn reflect(spirv: &[u32]) -> Result<EntryPoint> {
-    let mut entry_points =
-        ReflectConfig::new().spv(spirv).ref_all_rscs(false).reflect().map_err(|error| anyhow::anyhow!("{error}"))?;
-    ensure!(entry_points.len() == 1, "{} entry points, expected one", entry_points.len());
+    let mut entry_points = ReflectConfig::new()
+        .spv(spirv)
+        .ref_all_rscs(false)
+        .reflect()
+        .map_err(|error| anyhow::anyhow!("{error}"))?;
+    ensure!(
+        entry_points.len() == 1,
+        "{} entry points, expected one",
+        entry_points.len()
+    );
     Ok(entry_points.remove(0))
 }
 
@@ -91,7 +113,11 @@ fn check_bindings(spirv: &[u32], entry_point: &EntryPoint) -> Result<()> {
         let (words, op) = ((first >> 16) as usize, first & 0xffff);
         ensure!(words > 0 && words <= rest.len(), "damaged SPIR-V");
         if op == OP_DECORATE && rest[2] == BINDING {
-            ensure!(reflected.contains(&rest[3]), "binding {} wasn't reflected; use its buffer by name", rest[3]);
+            ensure!(
+                reflected.contains(&rest[3]),
+                "binding {} wasn't reflected; use its buffer by name",
+                rest[3]
+            );
         }
         rest = &rest[words..];
     }
@@ -105,7 +131,13 @@ fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result
     let mut push_constants = "None".to_owned();
     for variable in &entry_point.vars {
         match variable {
-            Variable::Descriptor { name, desc_bind, desc_ty, ty, .. } => {
+            Variable::Descriptor {
+                name,
+                desc_bind,
+                desc_ty,
+                ty,
+                ..
+            } => {
                 let (buffer, access, element) = match (desc_ty, ty) {
                     (DescriptorType::StorageBuffer(access), Type::Struct(block)) => {
                         (block.name(), access_name(*access), fields(element(block))?)
@@ -113,9 +145,11 @@ fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result
                     (DescriptorType::UniformBuffer(), Type::Struct(block)) => {
                         (block.name(), "Uniform", fields(element(block))?)
                     }
-                    (DescriptorType::UniformTexelBuffer(), _) => {
-                        (name.as_deref(), "Texels", "StructLayout { name: \"\", fields: &[] }".to_owned())
-                    }
+                    (DescriptorType::UniformTexelBuffer(), _) => (
+                        name.as_deref(),
+                        "Texels",
+                        "StructLayout { name: \"\", fields: &[] }".to_owned(),
+                    ),
                     other => bail!("{other:?} isn't a buffer"),
                 };
                 let buffer = buffer.context("a buffer without a name")?;
@@ -128,7 +162,10 @@ fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result
                     ),
                 );
             }
-            Variable::PushConstant { ty: Type::Struct(block), .. } => {
+            Variable::PushConstant {
+                ty: Type::Struct(block),
+                ..
+            } => {
                 push_constants = format!("Some({})", fields(block)?);
             }
             Variable::SpecConstant { name, spec_id, .. } => {
@@ -138,8 +175,10 @@ fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result
             other => bail!("unexpected interface: {other:?}"),
         }
     }
-    let constants: Vec<String> =
-        constants.iter().map(|(id, name)| format!("SpecConstant {{ id: {id}, name: \"{name}\" }}")).collect();
+    let constants: Vec<String> = constants
+        .iter()
+        .map(|(id, name)| format!("SpecConstant {{ id: {id}, name: \"{name}\" }}"))
+        .collect();
     let bindings: Vec<String> = bindings.into_values().collect();
     writeln!(
         module,
@@ -166,7 +205,9 @@ fn workgroup_size(entry_point: &EntryPoint) -> Result<u32> {
         let bytes = operand.value.to_typeless().context("a local size that is no literal")?;
         sizes.push(u32::from_le_bytes(bytes.as_ref().try_into()?));
     }
-    let [x, 1, 1] = sizes[..] else { bail!("local size {sizes:?}, expected (x, 1, 1)") };
+    let [x, 1, 1] = sizes[..] else {
+        bail!("local size {sizes:?}, expected (x, 1, 1)")
+    };
     Ok(x)
 }
 
@@ -199,7 +240,10 @@ fn size(ty: &Type) -> Result<usize> {
             (Some(count), Some(stride)) => count as usize * stride,
             _ => 0,
         },
-        other => other.nbyte().or_else(|| other.min_nbyte()).context("a type without a size")?,
+        other => other
+            .nbyte()
+            .or_else(|| other.min_nbyte())
+            .context("a type without a size")?,
     })
 }
 
@@ -213,5 +257,9 @@ fn fields(layout: &StructType) -> Result<String> {
             size(&member.ty)?
         ));
     }
-    Ok(format!("StructLayout {{ name: \"{}\", fields: &[{}] }}", layout.name().unwrap_or(""), fields.join(", ")))
+    Ok(format!(
+        "StructLayout {{ name: \"{}\", fields: &[{}] }}",
+        layout.name().unwrap_or(""),
+        fields.join(", ")
+    ))
 }

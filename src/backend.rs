@@ -76,7 +76,10 @@ impl Counters {
             ));
         }
         if self.non_finite > 0 {
-            warnings.push(format!("{} values were NaN or infinite and were left out", self.non_finite));
+            warnings.push(format!(
+                "{} values were NaN or infinite and were left out",
+                self.non_finite
+            ));
         }
         warnings
     }
@@ -106,7 +109,9 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         photon_capacity: 0,
         cell_bits: 0,
         alpha: config.alpha,
-        initial_radius2: config.radius.map_or(0.0, |radius| (radius * scene.scale).powi(2) as f32),
+        initial_radius2: config
+            .radius
+            .map_or(0.0, |radius| (radius * scene.scale).powi(2) as f32),
         loop_limit,
         scan_padding: 0,
     }

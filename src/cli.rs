@@ -6,6 +6,8 @@ mod list;
 mod progress;
 mod render;
 
+use std::io::Write as _;
+
 use anyhow::Result;
 use clap::Parser;
 
@@ -28,11 +30,16 @@ pub fn run() -> Result<Outcome> {
     let arguments = Arguments::parse();
     match arguments.command {
         None => render::render(&arguments.render),
-        Some(Command::Devices { json }) => list::devices(json).map(|()| Outcome::Done),
-        Some(Command::Gathers) => {
-            list::gathers();
-            Ok(Outcome::Done)
-        }
-        Some(Command::Inspect { scene, json }) => list::inspect(&scene, json).map(|()| Outcome::Done),
+        Some(Command::Devices { json }) => print(&list::devices(json)?),
+        Some(Command::Gathers) => print(&list::gathers()?),
+        Some(Command::Inspect { scene, json }) => print(&list::inspect(&scene, json)?),
+    }
+}
+
+/// Prints to stdout; a reader that has seen enough (`| head`) is no error.
+fn print(text: &str) -> Result<Outcome> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(Outcome::Done),
     }
 }

@@ -87,7 +87,10 @@ impl RenderConfig {
             )));
         }
         if !(self.alpha > 0.0 && self.alpha < 1.0) {
-            return Err(Error::Config(format!("--alpha {}: must lie between 0 and 1, both excluded", self.alpha)));
+            return Err(Error::Config(format!(
+                "--alpha {}: must lie between 0 and 1, both excluded",
+                self.alpha
+            )));
         }
         if let Some(radius) = self.radius
             && !(radius > 0.0 && radius.is_finite())
@@ -95,7 +98,9 @@ impl RenderConfig {
             return Err(Error::Config(format!("--radius {radius}: must be above 0")));
         }
         if self.photons == 0 {
-            return Err(Error::Config("--photons 0: at least one photon path is needed".to_owned()));
+            return Err(Error::Config(
+                "--photons 0: at least one photon path is needed".to_owned(),
+            ));
         }
         if self.max_depth == 0 {
             return Err(Error::Config("--max-depth 0: at least one bounce is needed".to_owned()));
@@ -132,6 +137,8 @@ pub struct Sizes {
     pub lane_capacity: u32,
     /// log2 of the grid's buckets.
     pub cell_bits: u32,
+    /// Launches among which a gather's photons are dealt: 1 unless the driver cuts its loops.
+    pub gather_parts: u32,
 }
 
 /// What of a device the sizes depend on.
@@ -157,13 +164,17 @@ impl Sizes {
             Estimator::Ppm => PPM_SLOTS,
         };
         let photons_at_most = (limits.storage_buffer_bytes / size_of::<crate::layout::Photon>() as u64) as u32;
-        let batch_paths = config.photons.min((f64::from(photons_at_most) / (2.0 * EXPECTED_PHOTONS)) as u32).max(1);
+        let batch_paths = config
+            .photons
+            .min((f64::from(photons_at_most) / (2.0 * EXPECTED_PHOTONS)) as u32)
+            .max(1);
         let mut sizes = Self {
             pixel_slots: width.div_ceil(TILE) * height.div_ceil(TILE) * TILE * TILE,
             slots_per_pixel,
             batch_paths,
             photon_lanes: 0,
             lane_capacity: 0,
+            gather_parts: 1,
             cell_bits: (batch_paths.ilog2() + 1).clamp(8, 24) / (2 * SORT_DIGIT_BITS) * (2 * SORT_DIGIT_BITS),
         };
         sizes.set_lanes(limits.lanes);

@@ -49,9 +49,17 @@ pub fn scan(buffer: BufferId, count: u32, recording: &mut Recording) {
     let bound = [(BufferId::Scan, buffer)];
     let blocks = count.div_ceil(SCAN_BLOCK);
     let threads = blocks * shaders::SCAN_BLOCKS.workgroup;
-    recording.dispatch(StageDesc::new(&shaders::SCAN_BLOCKS, threads).push(count).bind(bound.to_vec()));
+    recording.dispatch(
+        StageDesc::new(&shaders::SCAN_BLOCKS, threads)
+            .push(count)
+            .bind(bound.to_vec()),
+    );
     recording.dispatch(StageDesc::new(&shaders::SCAN_SUMS, shaders::SCAN_SUMS.workgroup).push(blocks));
-    recording.dispatch(StageDesc::new(&shaders::SCAN_ADD, count).push(count).bind(bound.to_vec()));
+    recording.dispatch(
+        StageDesc::new(&shaders::SCAN_ADD, count)
+            .push(count)
+            .bind(bound.to_vec()),
+    );
 }
 
 /// Records a stable sort of [`BufferId::Values`] by the low `bits` bits of [`BufferId::Keys`]. `capacity` is the most
@@ -73,10 +81,18 @@ pub fn sort(count: BufferId, capacity: u32, bits: u32, recording: &mut Recording
             (ValuesOut, there.1),
         ];
         let count_threads = tiles * shaders::SORT_COUNT.workgroup;
-        recording.dispatch(StageDesc::new(&shaders::SORT_COUNT, count_threads).push(push).bind(bound.clone()));
+        recording.dispatch(
+            StageDesc::new(&shaders::SORT_COUNT, count_threads)
+                .push(push)
+                .bind(bound.clone()),
+        );
         scan(BufferId::Histograms, tiles << SORT_DIGIT_BITS, recording);
         let scatter_threads = tiles * shaders::SORT_SCATTER.workgroup;
-        recording.dispatch(StageDesc::new(&shaders::SORT_SCATTER, scatter_threads).push(push).bind(bound));
+        recording.dispatch(
+            StageDesc::new(&shaders::SORT_SCATTER, scatter_threads)
+                .push(push)
+                .bind(bound),
+        );
         std::mem::swap(&mut here, &mut there);
     }
 }
@@ -96,5 +112,8 @@ fn grid(sizes: &Sizes, recording: &mut Recording) {
     sort(BufferId::PhotonCount, photons, sizes.cell_bits, recording);
     recording.fill(BufferId::CellRanges, 0);
     recording.dispatch(StageDesc::new(&shaders::GRID_CELLS, photons));
-    recording.dispatch(StageDesc::new(&shaders::GATHER_GRID, sizes.slots()));
+    let part = photons.div_ceil(sizes.gather_parts);
+    for first in (0..photons).step_by(part as usize) {
+        recording.dispatch(StageDesc::new(&shaders::GATHER_GRID, sizes.slots()).push([first, first + part]));
+    }
 }

@@ -5,6 +5,13 @@ use bytemuck::{Pod, Zeroable};
 /// Object of a visible point whose path met no matte surface.
 pub const NO_OBJECT: u32 = u32::MAX;
 
+/// Bit of [`StatusCounters::again`]: a lane's photons didn't fit.
+pub const PHOTONS_DID_NOT_FIT: u32 = 1;
+/// Bit of [`StatusCounters::again`]: a lane's paths need more loop iterations than the driver gives.
+pub const LANES_TOO_LONG: u32 = 2;
+/// Bit of [`StatusCounters::again`]: a visible point has more photons to test than loop iterations.
+pub const GATHERS_TOO_LONG: u32 = 4;
+
 /// A field's name, offset and size in bytes.
 pub type FieldLayout = (&'static str, usize, usize);
 
@@ -242,8 +249,8 @@ device_structs! {
         pub cut_paths: u32,
         /// Values that were NaN or infinite and were left out.
         pub non_finite: u32,
-        /// 1: photons didn't fit; the iteration has to be done again.
-        pub overflow: u32,
+        /// Why the iteration has to be done again, bits; see [`PHOTONS_DID_NOT_FIT`] and the next two.
+        pub again: u32,
         /// Photons stored, low word.
         pub photons_stored_low: u32,
         /// High word.

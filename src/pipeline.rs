@@ -6,7 +6,9 @@ use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::gather::{METHODS, scan};
 use crate::gpu::Device;
-use crate::layout::{CellRange, Photon, Settings, StatusCounters, VisiblePoint};
+use crate::layout::{
+    CellRange, GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Photon, Settings, StatusCounters, VisiblePoint,
+};
 use crate::record::{Recording, Run};
 use crate::scene::{Camera, PackedScene};
 use crate::stage::{BufferId, Shader, StageDesc};
@@ -74,6 +76,11 @@ pub struct Renderer {
     counters: Counters,
 }
 
+/// The iteration whose photons the radius is found from; no render gets that far.
+const PILOT: u32 = u32::MAX;
+/// Rounds of shrinking the radius where photons are denser than wanted.
+const FITS: u32 = 2;
+
 /// Loop iterations that photon paths of a lane may make together where the driver has a limit: a subgroup's lanes share
 /// it on the driver that has one, and an inner loop runs as long as its slowest lane.
 fn loop_budget(limit: u32) -> u32 {
@@ -99,17 +106,26 @@ impl Renderer {
         device.upload(BufferId::Materials, &scene.materials)?;
         device.upload(BufferId::Lights, &scene.lights)?;
         let settings = settings(&config, scene, camera, limits.loop_limit);
-        let mut renderer =
-            Self { device, config, sizes, settings, iterations: 0, emitted: 0, counters: Counters::default() };
+        let mut renderer = Self {
+            device,
+            config,
+            sizes,
+            settings,
+            iterations: 0,
+            emitted: 0,
+            counters: Counters::default(),
+        };
         renderer.create_picture_buffers()?;
         renderer.create_photon_buffers()?;
         renderer.choose_radius()?;
-        renderer.reset()?;
         Ok(renderer)
     }
 
     fn stages(&self) -> Stages<'_> {
-        Stages { config: &self.config, sizes: &self.sizes }
+        Stages {
+            config: &self.config,
+            sizes: &self.sizes,
+        }
     }
 
     /// Runs an iteration; where photons don't fit or loops are cut, makes room and does it again.
@@ -117,8 +133,7 @@ impl Renderer {
         let mut run = self.device.run(recording)?;
         loop {
             let status = self.take_status()?;
-            let cut = status.cut_paths > 0 && self.sizes.paths_per_lane() > 1;
-            if status.overflow == 0 && !cut {
+            if status.again == 0 {
                 self.counters.photons_stored +=
                     u64::from(status.photons_stored_low) | u64::from(status.photons_stored_high) << 32;
                 self.counters.truncated_paths += u64::from(status.truncated_paths);
@@ -126,19 +141,30 @@ impl Renderer {
                 self.counters.non_finite += u64::from(status.non_finite);
                 return Ok(run);
             }
-            self.counters.repeated_iterations += 1;
-            if cut {
-                self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
-            }
-            if status.overflow != 0 {
-                self.sizes.lane_capacity = self.sizes.lane_capacity.max(status.lane_need + status.lane_need / 4 + 1);
-            }
-            self.create_photon_buffers()?;
-            let mut again = Recording::new();
-            again.fill(BufferId::GatheredOf, 0);
-            self.device.run(&again)?;
+            self.make_room(&status)?;
             run = self.device.run(&self.stages().iteration(self.iterations))?;
         }
+    }
+
+    /// After an iteration that has to be done again: sizes that it needs, and what it gathered forgotten.
+    fn make_room(&mut self, status: &StatusCounters) -> Result<()> {
+        self.counters.repeated_iterations += 1;
+        if status.again & LANES_TOO_LONG != 0 {
+            self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
+        }
+        if status.again & PHOTONS_DID_NOT_FIT != 0 {
+            self.sizes.lane_capacity = self
+                .sizes
+                .lane_capacity
+                .max(status.lane_need + status.lane_need / 4 + 1);
+        }
+        if status.again & GATHERS_TOO_LONG != 0 {
+            self.sizes.gather_parts *= 2;
+        }
+        self.create_photon_buffers()?;
+        let mut recording = Recording::new();
+        recording.fill(BufferId::GatheredOf, 0);
+        self.device.run(&recording).map(|_| ())
     }
 
     fn take_status(&mut self) -> Result<StatusCounters> {
@@ -146,7 +172,10 @@ impl Renderer {
         let mut recording = Recording::new();
         recording.fill(BufferId::Status, 0);
         self.device.run(&recording)?;
-        status.first().copied().ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
+        status
+            .first()
+            .copied()
+            .ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
     }
 
     /// Sizes of the buffers.
@@ -213,23 +242,35 @@ impl Renderer {
         self.device.upload(BufferId::Settings, &[self.settings])
     }
 
-    /// Takes the user's radius, or finds one from the density of a first batch of photons.
+    /// Takes the user's radius, or finds one from the density of pilot photons: one for the median visible point, then
+    /// smaller ones where the photons are denser. Resets the statistics.
     fn choose_radius(&mut self) -> Result<()> {
-        if self.settings.initial_radius2 == 0.0 {
-            let mut recording = Recording::new();
-            recording.fill(BufferId::Status, 0);
-            self.stages().camera(0, &mut recording);
-            self.stages().photons(0, 0, &mut recording);
-            self.device.run(&recording)?;
-            let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
-            let count: Vec<u32> = self.device.download(BufferId::PhotonCount, Some(1))?;
-            let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
-            let radius = radius::automatic(&visible_points, &photons);
-            // A batch is a part of the iteration's photons; the density is that of the whole.
-            let share = f64::from(self.sizes.batch_paths) / f64::from(self.config.photons);
-            self.settings.initial_radius2 = (radius * radius * share) as f32;
+        if self.config.radius.is_some() {
+            return self.reset();
         }
-        self.device.upload(BufferId::Settings, &[self.settings])
+        let mut recording = Recording::new();
+        recording.fill(BufferId::Status, 0);
+        self.stages().camera(0, &mut recording);
+        self.stages().photons(PILOT, 0, &mut recording);
+        self.device.run(&recording)?;
+        let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
+        let count: Vec<u32> = self.device.download(BufferId::PhotonCount, Some(1))?;
+        let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
+        // The pilot is a batch; the densities of the whole iteration's photons are higher.
+        let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
+        let radius = radius::automatic(&visible_points, &photons) as f32;
+        self.settings.initial_radius2 = radius * radius * share;
+        self.device.upload(BufferId::Settings, &[self.settings])?;
+        self.reset()?;
+        for _ in 0..FITS {
+            let mut recording = Recording::new();
+            (METHODS[self.config.gather].record)(&self.sizes, &mut recording);
+            recording.dispatch(
+                StageDesc::new(&shaders::FIT_RADIUS, self.sizes.slots()).push(radius::PHOTONS_WANTED as f32 * share),
+            );
+            self.device.run(&recording)?;
+        }
+        Ok(())
     }
 
     fn reset(&mut self) -> Result<()> {
@@ -257,7 +298,11 @@ impl Backend for Renderer {
         self.device.run(&recording)?;
         let [width, height] = self.config.resolution.map(|side| side as usize);
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
-        Ok(Image::new(width, height, film.iter().map(|&[r, g, b, _]| [r, g, b]).collect()))
+        Ok(Image::new(
+            width,
+            height,
+            film.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
+        ))
     }
 
     fn iterations(&self) -> u32 {

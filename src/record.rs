@@ -21,7 +21,10 @@ impl Command {
     /// The buffers that the command touches, and whether it writes them.
     pub fn touches(&self) -> Vec<(BufferId, bool)> {
         match self {
-            Self::Dispatch(stage) => stage.uses().map(|(_, buffer, access)| (buffer, access.writes())).collect(),
+            Self::Dispatch(stage) => stage
+                .uses()
+                .map(|(_, buffer, access)| (buffer, access.writes()))
+                .collect(),
             Self::Fill(buffer, _) => vec![(*buffer, true)],
             Self::Barrier => Vec::new(),
         }

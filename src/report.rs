@@ -114,7 +114,15 @@ impl Profile {
                 "{stage:<16} {launches:>8} {min:>12} {median:>12} {p95:>12} {total:>14} {share:>8}"
             );
         };
-        line(["stage", "launches", "min µs", "median µs", "p95 µs", "total µs", "share"]);
+        line([
+            "stage",
+            "launches",
+            "min µs",
+            "median µs",
+            "p95 µs",
+            "total µs",
+            "share",
+        ]);
         for stage in &stages {
             line([
                 stage.stage,
@@ -149,8 +157,15 @@ impl Profile {
 
     /// Every launch as an event of the Chrome trace format, which Perfetto reads too.
     pub fn trace(&self, subject: &Subject) -> serde_json::Value {
-        let launches = || self.runs.iter().enumerate().flat_map(|(i, run)| run.launches.iter().map(move |l| (i, l)));
-        let origin = launches().map(|(_, launch)| launch.begin_ns).fold(f64::INFINITY, f64::min);
+        let launches = || {
+            self.runs
+                .iter()
+                .enumerate()
+                .flat_map(|(i, run)| run.launches.iter().map(move |l| (i, l)))
+        };
+        let origin = launches()
+            .map(|(_, launch)| launch.begin_ns)
+            .fold(f64::INFINITY, f64::min);
         let events: Vec<_> = launches()
             .map(|(iteration, launch)| {
                 json!({
@@ -198,9 +213,15 @@ mod tests {
     #[test]
     fn stages_have_their_order_statistics() {
         let stages = profile().stages();
-        assert_eq!(stages.iter().map(|stage| stage.stage).collect::<Vec<_>>(), ["camera", "photons"]);
+        assert_eq!(
+            stages.iter().map(|stage| stage.stage).collect::<Vec<_>>(),
+            ["camera", "photons"]
+        );
         let camera = &stages[0];
-        assert_eq!((camera.launches, camera.min_us, camera.median_us, camera.p95_us), (20, 1.0, 10.0, 19.0));
+        assert_eq!(
+            (camera.launches, camera.min_us, camera.median_us, camera.p95_us),
+            (20, 1.0, 10.0, 19.0)
+        );
         assert_eq!(camera.total_us, 210.0);
         assert!((camera.share - 210.0 / 810.0).abs() < 1e-12);
     }
@@ -212,7 +233,11 @@ mod tests {
             resolution: [1, 1],
             gather: "grid".into(),
             photons: 1,
-            device: DeviceDescription { name: "d".into(), driver: "v".into(), timestamp_period_ns: 1.0 },
+            device: DeviceDescription {
+                name: "d".into(),
+                driver: "v".into(),
+                timestamp_period_ns: 1.0,
+            },
             counters: Counters::default(),
         };
         let trace = profile().trace(&subject);

@@ -124,7 +124,11 @@ pub struct StructLayout {
 impl StructLayout {
     /// Bytes up to the last member's end.
     pub fn size(&self) -> usize {
-        self.fields.iter().map(|field| field.offset + field.size).max().unwrap_or(0)
+        self.fields
+            .iter()
+            .map(|field| field.offset + field.size)
+            .max()
+            .unwrap_or(0)
     }
 }
 
@@ -185,7 +189,13 @@ pub struct StageDesc {
 impl StageDesc {
     /// A launch of `shader` with `threads` invocations.
     pub fn new(shader: &'static Shader, threads: u32) -> Self {
-        Self { shader, threads, constants: Cow::Borrowed(&[]), push: Vec::new(), bound: Cow::Borrowed(&[]) }
+        Self {
+            shader,
+            threads,
+            constants: Cow::Borrowed(&[]),
+            push: Vec::new(),
+            bound: Cow::Borrowed(&[]),
+        }
     }
 
     /// With these push constants.
@@ -215,7 +225,11 @@ impl StageDesc {
     pub fn uses(&self) -> impl Iterator<Item = (u32, BufferId, Access)> + '_ {
         self.shader.bindings.iter().map(|binding| {
             let actual = self.bound.iter().find(|(formal, _)| *formal == binding.buffer);
-            (binding.slot, actual.map_or(binding.buffer, |&(_, actual)| actual), binding.access)
+            (
+                binding.slot,
+                actual.map_or(binding.buffer, |&(_, actual)| actual),
+                binding.access,
+            )
         })
     }
 }

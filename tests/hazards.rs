@@ -17,7 +17,10 @@ fn unprotected(commands: &[Command]) -> Vec<(usize, usize)> {
                 break;
             }
             let conflict = earlier.touches().iter().any(|(buffer, writes)| {
-                later.touches().iter().any(|(other, other_writes)| buffer == other && (*writes || *other_writes))
+                later
+                    .touches()
+                    .iter()
+                    .any(|(other, other_writes)| buffer == other && (*writes || *other_writes))
             });
             if conflict {
                 pairs.push((first, second));
@@ -30,10 +33,22 @@ fn unprotected(commands: &[Command]) -> Vec<(usize, usize)> {
 fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording)> {
     let mut recordings = Vec::new();
     for (index, method) in METHODS.iter().enumerate() {
-        let config = RenderConfig { resolution: [320, 280], gather: index, photons, ..RenderConfig::default() };
-        let limits = DeviceLimits { storage_buffer_bytes, loop_limit: u32::MAX, lanes: 4096 };
+        let config = RenderConfig {
+            resolution: [320, 280],
+            gather: index,
+            photons,
+            ..RenderConfig::default()
+        };
+        let limits = DeviceLimits {
+            storage_buffer_bytes,
+            loop_limit: u32::MAX,
+            lanes: 4096,
+        };
         let sizes = Sizes::new(&config, limits);
-        let stages = Stages { config: &config, sizes: &sizes };
+        let stages = Stages {
+            config: &config,
+            sizes: &sizes,
+        };
         recordings.push((method.name.to_owned(), stages.iteration(1)));
     }
     recordings
@@ -43,7 +58,10 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
 fn no_command_of_an_iteration_races_with_another() {
     for (method, recording) in iterations(100_000, 128 << 20) {
         let pairs = unprotected(recording.commands());
-        assert!(pairs.is_empty(), "{method}: commands {pairs:?} touch one buffer without a barrier between them");
+        assert!(
+            pairs.is_empty(),
+            "{method}: commands {pairs:?} touch one buffer without a barrier between them"
+        );
     }
 }
 
@@ -51,18 +69,32 @@ fn no_command_of_an_iteration_races_with_another() {
 fn no_command_races_where_an_iteration_is_done_in_batches() {
     for (method, recording) in iterations(3_000_000, 16 << 20) {
         let pairs = unprotected(recording.commands());
-        assert!(pairs.is_empty(), "{method}: commands {pairs:?} touch one buffer without a barrier between them");
+        assert!(
+            pairs.is_empty(),
+            "{method}: commands {pairs:?} touch one buffer without a barrier between them"
+        );
     }
 }
 
 #[test]
 fn a_missing_barrier_is_found() {
     let (_, recording) = iterations(100_000, 128 << 20).pop().expect("a method");
-    let barriers = recording.commands().iter().filter(|command| matches!(command, Command::Barrier)).count();
+    let barriers = recording
+        .commands()
+        .iter()
+        .filter(|command| matches!(command, Command::Barrier))
+        .count();
     assert!(barriers > 5, "{barriers} barriers in an iteration");
-    let without: Vec<Command> =
-        recording.commands().iter().filter(|command| !matches!(command, Command::Barrier)).cloned().collect();
-    assert!(!unprotected(&without).is_empty(), "the check passes without any barrier: it checks nothing");
+    let without: Vec<Command> = recording
+        .commands()
+        .iter()
+        .filter(|command| !matches!(command, Command::Barrier))
+        .cloned()
+        .collect();
+    assert!(
+        !unprotected(&without).is_empty(),
+        "the check passes without any barrier: it checks nothing"
+    );
 }
 
 #[test]

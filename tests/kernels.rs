@@ -7,6 +7,8 @@ mod agreement;
 mod bench;
 #[path = "kernels/gather.rs"]
 mod gather;
+#[path = "kernels/limits.rs"]
+mod limits;
 #[path = "kernels/oracle.rs"]
 mod oracle;
 #[path = "kernels/photons.rs"]

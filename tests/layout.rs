@@ -10,8 +10,14 @@ fn every_struct_of_a_block_has_the_same_fields_in_rust_and_glsl() {
     for shader in ALL {
         for binding in shader.bindings {
             let glsl = binding.element;
-            let Some((_, rust)) = LAYOUTS.iter().find(|(name, _)| *name == glsl.name) else { continue };
-            let reflected: Vec<_> = glsl.fields.iter().map(|field| (field.name, field.offset, field.size)).collect();
+            let Some((_, rust)) = LAYOUTS.iter().find(|(name, _)| *name == glsl.name) else {
+                continue;
+            };
+            let reflected: Vec<_> = glsl
+                .fields
+                .iter()
+                .map(|field| (field.name, field.offset, field.size))
+                .collect();
             assert_eq!(
                 reflected, *rust,
                 "{} in stage {} (left) isn't layout::{} (right)",
@@ -20,7 +26,10 @@ fn every_struct_of_a_block_has_the_same_fields_in_rust_and_glsl() {
             compared += 1;
         }
     }
-    assert!(compared > 20, "only {compared} blocks were compared: does reflection still give struct names?");
+    assert!(
+        compared > 20,
+        "only {compared} blocks were compared: does reflection still give struct names?"
+    );
 }
 
 #[test]
@@ -45,7 +54,12 @@ fn every_block_of_structs_has_a_rust_struct() {
 fn push_constants_fit_every_device() {
     for shader in ALL {
         if let Some(block) = shader.push_constants {
-            assert!(block.size() <= 128, "stage {}: {} bytes of push constants", shader.name, block.size());
+            assert!(
+                block.size() <= 128,
+                "stage {}: {} bytes of push constants",
+                shader.name,
+                block.size()
+            );
         }
     }
 }

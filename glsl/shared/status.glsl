@@ -5,12 +5,17 @@ struct StatusCounters {
     uint truncated_paths;     // ended by max_depth
     uint cut_paths;           // ended by the driver's loop limit
     uint non_finite;          // values that were NaN or infinite and were left out
-    uint overflow;            // 1: photons didn't fit; the iteration has to be done again
+    uint again;               // why the iteration has to be done again; 0: it needn't
     uint photons_stored_low;  // of all batches, 64 bits
     uint photons_stored_high;
 };
 
 layout(std430) buffer Status { StatusCounters status; };
+
+// Reasons to do an iteration again, bits. `direct` and `update` do nothing where there is one.
+const uint PHOTONS_DID_NOT_FIT = 1u;
+const uint LANES_TOO_LONG = 2u;   // a lane's paths need more loop iterations than the driver gives
+const uint GATHERS_TOO_LONG = 4u; // likewise a visible point's photons
 
 bool finite(vec3 v) {
     return !any(isnan(v)) && !any(isinf(v));

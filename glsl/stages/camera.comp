@@ -2,6 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 // Camera rays: follows each pixel's path over mirrors and glass to its visible points.
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
@@ -12,8 +14,6 @@
 #include "light.glsl"
 #include "visible_point.glsl"
 #include "status.glsl"
-
-layout(local_size_x = 64) in;
 
 // Visible points a pixel: above 1, glass splits the path for as long as a slot is free (the paper's estimator, whose
 // visible points are found once and have to hold both branches).

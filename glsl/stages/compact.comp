@@ -2,12 +2,12 @@
 #extension GL_GOOGLE_include_directive : require
 // Moves the lanes' photons together, in the order of lanes.
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "texel.glsl"
 #include "photon.glsl"
 #include "status.glsl"
-
-layout(local_size_x = 64) in;
 
 uniform usamplerBuffer LanePhotons;
 layout(std430) readonly buffer LaneCounts { uint lane_counts[]; };
@@ -22,7 +22,7 @@ void main() {
         status.photons_in_batch = max(status.photons_in_batch, scan_total);
         photon_count = min(scan_total, settings.photon_capacity);
         if (scan_total > settings.photon_capacity) {
-            status.overflow = 1u;
+            atomicOr(status.again, PHOTONS_DID_NOT_FIT);
         }
         uint before = status.photons_stored_low;
         status.photons_stored_low = before + scan_total;

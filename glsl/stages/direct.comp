@@ -3,6 +3,8 @@
 // Adds what each visible point's path saw of the lights: by itself and, unless photons carry direct light too, by one
 // shadow ray to a point of a light chosen in proportion to its flux.
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
@@ -15,8 +17,6 @@
 #include "two_float.glsl"
 #include "statistics.glsl"
 #include "status.glsl"
-
-layout(local_size_x = 64) in;
 
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
 
@@ -65,7 +65,7 @@ vec3 sample_light(VisiblePoint visible_point, uint slot) {
 
 void main() {
     uint slot = gl_GlobalInvocationID.x;
-    if (slot >= pixel_slots() * settings.slots_per_pixel || status.overflow != 0u) {
+    if (slot >= pixel_slots() * settings.slots_per_pixel || status.again != 0u) {
         return;
     }
     VisiblePoint visible_point = VISIBLE_POINT(slot);

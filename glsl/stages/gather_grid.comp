@@ -2,6 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 // Gathers from the cells of the hashed grid that a visible point's radius reaches.
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "texel.glsl"
 #include "sampling.glsl"
@@ -11,8 +13,13 @@
 #include "gather.glsl"
 
 #include "grid.glsl"
+#include "status.glsl"
 
-layout(local_size_x = 64) in;
+// The part of the sorted photons that this launch looks at.
+layout(push_constant) uniform Push {
+    uint first;
+    uint end;
+} push;
 
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer StatisticsOf;
@@ -37,13 +44,21 @@ void main() {
     ivec3 high = cell_of(receiver.position + reach, inverse);
     vec3 flux = vec3(0.0);
     uint count = 0u;
+    uint to_test = 0u;
+    uint tested = 0u;
+    uint cells = 0u;
     for (int z = low.z; z <= high.z; z++) {
         for (int y = low.y; y <= high.y; y++) {
             for (int x = low.x; x <= high.x; x++) {
                 ivec3 cell = ivec3(x, y, z);
                 uvec4 range = TEXEL_BITS(CellRanges, bucket_of(cell));
-                for (uint i = range.x; i < range.y; i++) {
+                uint first = max(range.x, push.first);
+                uint end = min(range.y, push.end);
+                to_test += max(end, first) - first;
+                cells += 1u;
+                for (uint i = first; i < end; i++) {
                     Photon photon = PHOTON(SortedPhotons, i);
+                    tested += 1u;
                     // Cells that share a bucket must not be counted twice.
                     if (accepts(receiver, photon) && cell_of(photon.position_object.xyz, inverse) == cell) {
                         flux += photon.flux_direction.rgb;
@@ -52,6 +67,11 @@ void main() {
                 }
             }
         }
+    }
+    // Loops that didn't reach their end were cut by the driver: the gather is done again in smaller parts.
+    ivec3 extent = high - low + 1;
+    if (tested != to_test || cells != uint(extent.x * extent.y * extent.z)) {
+        atomicOr(status.again, GATHERS_TOO_LONG);
     }
     vec4 before = gathered[slot].flux_count;
     gathered[slot].flux_count = vec4(before.rgb + flux, uintBitsToFloat(floatBitsToUint(before.w) + count));

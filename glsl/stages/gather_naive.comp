@@ -3,6 +3,8 @@
 // The paper's naive hitpoint illumination: every visible point against every photon of a range (one dispatch a range,
 // since drivers cut long loops).
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "texel.glsl"
 #include "sampling.glsl"
@@ -10,8 +12,6 @@
 #include "visible_point.glsl"
 #include "statistics.glsl"
 #include "gather.glsl"
-
-layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push {
     uint first; // photon

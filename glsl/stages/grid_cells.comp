@@ -2,6 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 // Puts the photons into the sorted order and notes where each bucket begins and ends.
 
+layout(local_size_x = 64) in;
+
 #include "texel.glsl"
 #include "photon.glsl"
 
@@ -12,8 +14,6 @@ struct CellRange {
     uint padding0;
     uint padding1;
 };
-
-layout(local_size_x = 64) in;
 
 layout(std430) readonly buffer Keys { uint keys[]; };
 layout(std430) readonly buffer Values { uint values[]; };

@@ -2,13 +2,13 @@
 #extension GL_GOOGLE_include_directive : require
 // The bucket of each photon, to be sorted by.
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "texel.glsl"
 #include "photon.glsl"
 
 #include "grid.glsl"
-
-layout(local_size_x = 64) in;
 
 layout(std430) readonly buffer Grid { GridShape grid; };
 uniform usamplerBuffer Photons;

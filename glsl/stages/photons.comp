@@ -4,6 +4,8 @@
 // other in one loop, so that no lane of a subgroup waits for another's longer path. A lane stores its photons in a
 // region of its own, which makes their order a pure function of the seed.
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
@@ -14,8 +16,6 @@
 #include "light.glsl"
 #include "photon.glsl"
 #include "status.glsl"
-
-layout(local_size_x = 64) in;
 
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
 
@@ -81,12 +81,13 @@ void main() {
     Path path;
     Random random;
     uint truncated = 0u;
-    uint cut = 0u;
     uint non_finite = 0u;
-    while (true) {
+    bool finished = false;
+    while (!loops_cut) {
         loop_count += 1u;
         if (!alive) {
             if (next >= push.path_count) {
+                finished = true;
                 break;
             }
             random = random_for(PHOTON_PATH, push.first_path + next, push.iteration, settings.seed);
@@ -96,8 +97,6 @@ void main() {
         }
         Hit hit = trace(path.origin, path.direction, 1e30, path.ignored, false);
         if (loops_cut) {
-            // This path and those that the lane has not begun.
-            cut = 1u + (push.path_count + settings.photon_lanes - 1u - next) / settings.photon_lanes;
             break;
         }
         if (hit.triangle == MISS) {
@@ -157,13 +156,19 @@ void main() {
     lane_offsets[lane] = kept;
     atomicMax(status.lane_need, stored);
     if (stored > settings.lane_capacity) {
-        atomicOr(status.overflow, 1u);
+        atomicOr(status.again, PHOTONS_DID_NOT_FIT);
+    }
+    if (!finished) {
+        // The loop's own end was never reached: the driver or the limit cut it. Fewer paths a lane may help.
+        uint begun = alive ? 1u : 0u;
+        uint left = next < push.path_count ? (push.path_count - 1u - next) / settings.photon_lanes + 1u : 0u;
+        atomicAdd(status.cut_paths, begun + left);
+        if (push.path_count > settings.photon_lanes) {
+            atomicOr(status.again, LANES_TOO_LONG);
+        }
     }
     if (truncated > 0u) {
         atomicAdd(status.truncated_paths, truncated);
-    }
-    if (cut > 0u) {
-        atomicAdd(status.cut_paths, cut);
     }
     if (non_finite > 0u) {
         atomicAdd(status.non_finite, non_finite);

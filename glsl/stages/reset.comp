@@ -2,12 +2,12 @@
 #extension GL_GOOGLE_include_directive : require
 // Statistics before the first iteration.
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
-
-layout(local_size_x = 64) in;
 
 layout(std430) writeonly buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) writeonly buffer GatheredOf { Gathered gathered[]; };

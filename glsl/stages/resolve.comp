@@ -2,12 +2,12 @@
 #extension GL_GOOGLE_include_directive : require
 // The paper's image synthesis: eq. 4 for each visible point, and the mean of what was seen directly.
 
+layout(local_size_x = 64) in;
+
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
-
-layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push {
     uint iterations;

@@ -9,7 +9,12 @@ use crate::gather;
 
 /// Progressive photon mapping on Vulkan: a glTF scene in, an OpenEXR picture out.
 #[derive(Debug, Parser)]
-#[command(name = "ppm-vk", version, args_conflicts_with_subcommands = true, arg_required_else_help = true)]
+#[command(
+    name = "ppm-vk",
+    version,
+    args_conflicts_with_subcommands = true,
+    arg_required_else_help = true
+)]
 pub struct Arguments {
     #[command(flatten)]
     pub render: RenderArguments,
@@ -139,22 +144,38 @@ fn number(text: &str) -> Result<f64, String> {
 
 fn alpha(text: &str) -> Result<f32, String> {
     let alpha = number(text)? as f32;
-    if alpha > 0.0 && alpha < 1.0 { Ok(alpha) } else { Err("must lie between 0 and 1, both excluded".to_owned()) }
+    if alpha > 0.0 && alpha < 1.0 {
+        Ok(alpha)
+    } else {
+        Err("must lie between 0 and 1, both excluded".to_owned())
+    }
 }
 
 fn radius(text: &str) -> Result<f64, String> {
     let radius = number(text)?;
-    if radius > 0.0 && radius.is_finite() { Ok(radius) } else { Err("must be above 0".to_owned()) }
+    if radius > 0.0 && radius.is_finite() {
+        Ok(radius)
+    } else {
+        Err("must be above 0".to_owned())
+    }
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
     let seconds = number(text)?;
-    if seconds > 0.0 && seconds.is_finite() { Ok(seconds) } else { Err("must be above 0".to_owned()) }
+    if seconds > 0.0 && seconds.is_finite() {
+        Ok(seconds)
+    } else {
+        Err("must be above 0".to_owned())
+    }
 }
 
 fn exposure(text: &str) -> Result<f32, String> {
     let stops = number(text)? as f32;
-    if stops.abs() <= 100.0 { Ok(stops) } else { Err("must lie between -100 and 100".to_owned()) }
+    if stops.abs() <= 100.0 {
+        Ok(stops)
+    } else {
+        Err("must lie between -100 and 100".to_owned())
+    }
 }
 
 fn gather_method(name: &str) -> Result<usize, String> {

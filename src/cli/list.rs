@@ -1,5 +1,6 @@
-//! The commands that list things.
+//! The commands that list things. Each returns its text.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
@@ -10,39 +11,53 @@ use crate::gpu;
 use crate::scene::{PackedScene, Scene, Surface};
 
 /// `ppm-vk devices`.
-pub fn devices(as_json: bool) -> Result<()> {
+pub fn devices(as_json: bool) -> Result<String> {
     let devices = gpu::devices()?;
     if as_json {
-        println!("{}", serde_json::to_string_pretty(&devices)?);
-        return Ok(());
+        return Ok(serde_json::to_string_pretty(&devices)? + "\n");
     }
+    let mut text = String::new();
     for device in devices {
-        println!("{}: {} ({})", device.index, device.name, device.kind);
-        println!("   driver           {}, Vulkan {}", device.driver, device.api_version);
-        println!("   timestamps       {} ns", device.timestamp_period_ns);
-        println!("   subgroup         {}", device.subgroup_size);
-        println!("   shared memory    {} KiB", device.max_shared_memory_bytes >> 10);
-        println!("   storage buffer   {} MiB", device.max_storage_buffer_bytes >> 20);
+        writeln!(text, "{}: {} ({})", device.index, device.name, device.kind)?;
+        writeln!(
+            text,
+            "   driver           {}, Vulkan {}",
+            device.driver, device.api_version
+        )?;
+        writeln!(text, "   timestamps       {} ns", device.timestamp_period_ns)?;
+        writeln!(text, "   subgroup         {}", device.subgroup_size)?;
+        writeln!(text, "   shared memory    {} KiB", device.max_shared_memory_bytes >> 10)?;
+        writeln!(
+            text,
+            "   storage buffer   {} MiB",
+            device.max_storage_buffer_bytes >> 20
+        )?;
         if device.lacks.is_empty() {
-            println!("   runs             everything");
+            writeln!(text, "   runs             everything")?;
         } else {
-            println!("   runs             nothing: it lacks {}", device.lacks.join(", "));
+            writeln!(
+                text,
+                "   runs             nothing: it lacks {}",
+                device.lacks.join(", ")
+            )?;
         }
     }
-    Ok(())
+    Ok(text)
 }
 
 /// `ppm-vk gathers`.
-pub fn gathers() {
+pub fn gathers() -> Result<String> {
+    let mut text = String::new();
     for (index, method) in METHODS.iter().enumerate() {
         let default = if index == default_method() { " (default)" } else { "" };
-        println!("{:<20} {}{default}", method.name, method.summary);
-        println!("{:<20} {}", "", method.paper);
+        writeln!(text, "{:<20} {}{default}", method.name, method.summary)?;
+        writeln!(text, "{:<20} {}", "", method.paper)?;
     }
+    Ok(text)
 }
 
 /// `ppm-vk inspect`.
-pub fn inspect(path: &Path, as_json: bool) -> Result<()> {
+pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
     let scene = Scene::load(path)?;
     let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(path, what))?;
     let count = |is: fn(&Surface) -> bool| scene.materials.iter().filter(|material| is(&material.surface)).count();
@@ -64,24 +79,30 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<()> {
             "bounds": { "min": low.to_array(), "max": high.to_array() },
             "warnings": scene.warnings,
         });
-        println!("{}", serde_json::to_string_pretty(&value)?);
-        return Ok(());
+        return Ok(serde_json::to_string_pretty(&value)? + "\n");
     }
-    println!("triangles    {} ({} dropped)", scene.triangles.len(), scene.dropped_triangles);
-    println!("objects      {}", scene.objects.len());
-    println!(
+    let mut text = String::new();
+    writeln!(
+        text,
+        "triangles    {} ({} dropped)",
+        scene.triangles.len(),
+        scene.dropped_triangles
+    )?;
+    writeln!(text, "objects      {}", scene.objects.len())?;
+    writeln!(
+        text,
         "materials    {} matte, {} mirror, {} dielectric",
         count(|s| matches!(s, Surface::Matte)),
         count(|s| matches!(s, Surface::Mirror)),
         count(|s| matches!(s, Surface::Dielectric { .. }))
-    );
-    println!("lights       {} emissive triangles", packed.lights.len());
+    )?;
+    writeln!(text, "lights       {} emissive triangles", packed.lights.len())?;
     for (index, camera) in scene.cameras.iter().enumerate() {
-        println!("camera {index:<5} {}", camera.name);
+        writeln!(text, "camera {index:<5} {}", camera.name)?;
     }
-    println!("bounds       {low} to {high}");
+    writeln!(text, "bounds       {low} to {high}")?;
     for warning in &scene.warnings {
-        println!("warning      {warning}");
+        writeln!(text, "warning      {warning}")?;
     }
-    Ok(())
+    Ok(text)
 }

@@ -18,8 +18,12 @@ pub struct Limits {
 impl Limits {
     /// The part of the render that is done, 0 to 1.
     pub fn done(&self, iterations: u32, elapsed: Duration) -> f64 {
-        let by_iterations = self.iterations.map_or(0.0, |limit| f64::from(iterations) / f64::from(limit));
-        let by_time = self.time.map_or(0.0, |limit| elapsed.as_secs_f64() / limit.as_secs_f64());
+        let by_iterations = self
+            .iterations
+            .map_or(0.0, |limit| f64::from(iterations) / f64::from(limit));
+        let by_time = self
+            .time
+            .map_or(0.0, |limit| elapsed.as_secs_f64() / limit.as_secs_f64());
         by_iterations.max(by_time).min(1.0)
     }
 }
@@ -36,12 +40,20 @@ const STEPS: u64 = 1000;
 impl Progress {
     /// A bar for a render that begins now; invisible if `quiet`.
     pub fn new(limits: Limits, quiet: bool) -> Self {
-        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let target = if quiet {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
+        };
         let bar = ProgressBar::with_draw_target(Some(STEPS), target);
         if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} % {msg}") {
             bar.set_style(style);
         }
-        Self { bar, limits, start: Instant::now() }
+        Self {
+            bar,
+            limits,
+            start: Instant::now(),
+        }
     }
 
     /// Shows where the render is.
@@ -50,7 +62,10 @@ impl Progress {
         let done = self.limits.done(backend.iterations(), elapsed);
         self.bar.set_position((done * STEPS as f64) as u64);
         let seconds = elapsed.as_secs_f64().max(1e-9);
-        let of = self.limits.iterations.map_or(String::new(), |limit| format!("/{limit}"));
+        let of = self
+            .limits
+            .iterations
+            .map_or(String::new(), |limit| format!("/{limit}"));
         let left = if done > 0.0 { seconds * (1.0 - done) / done } else { 0.0 };
         self.bar.set_message(format!(
             "{}{of} iterations, {} photon paths/s, {} left",

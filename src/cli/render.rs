@@ -43,17 +43,23 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(path, what))?;
     let mut backend = open(arguments, &packed, camera, &config)?;
     if arguments.radius.is_none() {
-        eprintln!("initial radius {:.6} scene units (automatic)", f64::from(backend.radius()) / packed.scale);
+        eprintln!(
+            "initial radius {:.6} scene units (automatic)",
+            f64::from(backend.radius()) / packed.scale
+        );
     }
 
     let start = Instant::now();
     let limits = Limits {
-        iterations: arguments.iterations.or(arguments.time.is_none().then_some(DEFAULT_ITERATIONS)),
+        iterations: arguments
+            .iterations
+            .or(arguments.time.is_none().then_some(DEFAULT_ITERATIONS)),
         time: arguments.time.map(Duration::from_secs_f64),
     };
     let progress = Progress::new(limits, arguments.quiet);
     let mut profile = Profile::default();
-    while limits.done(backend.iterations(), start.elapsed()) < 1.0 && !(interrupt::asked() && backend.iterations() > 0) {
+    while limits.done(backend.iterations(), start.elapsed()) < 1.0 && !(interrupt::asked() && backend.iterations() > 0)
+    {
         profile.add(backend.iterate()?);
         progress.show(backend.as_ref());
     }
@@ -95,7 +101,11 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         counters: backend.counters(),
     };
     write_profile(arguments, &profile, &subject)?;
-    Ok(if interrupt::asked() { Outcome::Interrupted } else { Outcome::Done })
+    Ok(if interrupt::asked() {
+        Outcome::Interrupted
+    } else {
+        Outcome::Done
+    })
 }
 
 fn open(
@@ -142,11 +152,17 @@ fn outputs<'a>(arguments: &'a RenderArguments, output: &'a Path) -> impl Iterato
 
 fn write_profile(arguments: &RenderArguments, profile: &Profile, subject: &Subject) -> Result<()> {
     if arguments.profile {
-        print!("{}", profile.table(subject));
+        super::print(&profile.table(subject))?;
     }
     for (file, value) in [
-        (&arguments.profile_json, arguments.profile_json.as_ref().map(|_| profile.json(subject))),
-        (&arguments.trace, arguments.trace.as_ref().map(|_| profile.trace(subject))),
+        (
+            &arguments.profile_json,
+            arguments.profile_json.as_ref().map(|_| profile.json(subject)),
+        ),
+        (
+            &arguments.trace,
+            arguments.trace.as_ref().map(|_| profile.trace(subject)),
+        ),
     ] {
         if let (Some(file), Some(value)) = (file, value) {
             film::write_whole(file, &serde_json::to_vec_pretty(&value)?)?;

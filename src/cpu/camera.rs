@@ -30,11 +30,14 @@ struct Branch {
 pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Vec<VisiblePoint> {
     let slots_per_pixel = inputs.settings.slots_per_pixel as usize;
     let mut visible_points = vec![nothing_seen(DVec3::ZERO); pixel_slots(inputs.settings) * slots_per_pixel];
-    visible_points.par_chunks_mut(slots_per_pixel).enumerate().for_each(|(pixel_slot, slots)| {
-        if let Some(pixel) = pixel_of(inputs.settings, pixel_slot as u32) {
-            follow(inputs, pixel, iteration, slots, counts);
-        }
-    });
+    visible_points
+        .par_chunks_mut(slots_per_pixel)
+        .enumerate()
+        .for_each(|(pixel_slot, slots)| {
+            if let Some(pixel) = pixel_of(inputs.settings, pixel_slot as u32) {
+                follow(inputs, pixel, iteration, slots, counts);
+            }
+        });
     visible_points
 }
 

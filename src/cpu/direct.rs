@@ -58,7 +58,11 @@ fn sample_light(inputs: &Inputs<'_>, point: &VisiblePoint, [choice, u, v, _]: [f
     if !emits(emitter.material, front) || cos_surface <= 0.0 || direction.dot(geometric_normal) <= 0.0 {
         return DVec3::ZERO;
     }
-    let towards_surface = if front { emitter.geometric_normal } else { -emitter.geometric_normal };
+    let towards_surface = if front {
+        emitter.geometric_normal
+    } else {
+        -emitter.geometric_normal
+    };
     let origin = offset_origin(position, geometric_normal);
     let shadow_ray = Ray {
         origin,

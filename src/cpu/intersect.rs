@@ -184,7 +184,8 @@ mod tests {
     fn distance_and_coordinates_are_those_of_the_point() {
         let (t, u, v) = intersect_triangle(ray([0.25, 0.5, 3.0], [0.0, 0.0, -2.0]), TRIANGLE).expect("a hit");
         assert_eq!((t, u, v), (1.5, 0.25, 0.5));
-        let (t, u, v) = intersect_triangle(ray([0.25, 0.5, -3.0], [0.0, 0.0, 2.0]), TRIANGLE).expect("a hit from behind");
+        let (t, u, v) =
+            intersect_triangle(ray([0.25, 0.5, -3.0], [0.0, 0.0, 2.0]), TRIANGLE).expect("a hit from behind");
         assert_eq!((t, u, v), (1.5, 0.25, 0.5));
     }
 
@@ -196,7 +197,11 @@ mod tests {
             ([-0.01, 0.5, 1.0], [0.0, 0.0, -1.0]),
             ([-1.0, 0.25, 0.0], [1.0, 0.0, 0.0]),
         ] {
-            assert_eq!(intersect_triangle(ray(origin, direction), TRIANGLE), None, "{origin:?} {direction:?}");
+            assert_eq!(
+                intersect_triangle(ray(origin, direction), TRIANGLE),
+                None,
+                "{origin:?} {direction:?}"
+            );
         }
     }
 

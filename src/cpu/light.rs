@@ -12,3 +12,25 @@ pub(super) fn choose_light(lights: &[Light], u: f64) -> &Light {
 pub(super) fn emits(material: &Material, front: bool) -> bool {
     front || material.double_sided != 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_light_is_chosen_between_the_cumulative_probabilities() {
+        let light = |triangle, cumulative| Light {
+            triangle,
+            cumulative,
+            probability: 0.0,
+            area: 0.0,
+        };
+        // The last one's may be rounded to less than 1.
+        let lights = [light(0, 0.25), light(1, 0.25), light(2, 0.75), light(3, 0.999)];
+        let chosen = |u: f64| choose_light(&lights, u).triangle;
+        assert_eq!(
+            [0.0, 0.2499, 0.25, 0.7499, 0.75, 0.9999].map(chosen),
+            [0, 0, 2, 2, 3, 3]
+        );
+    }
+}

@@ -59,7 +59,11 @@ fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Path {
     let (u, v) = triangle_point(u, v);
     let emitter = surface_at(inputs.scene, light.triangle, u, v);
     let back = emitter.material.double_sided != 0 && side < 0.5;
-    let normal = if back { -emitter.geometric_normal } else { emitter.geometric_normal };
+    let normal = if back {
+        -emitter.geometric_normal
+    } else {
+        emitter.geometric_normal
+    };
     let emission = rgb(emitter.material.emission);
     // Le · π · area · sides over the light's probability, mean(Le) · π · area · sides / Σ(…).
     let flux = emission * f64::from(inputs.settings.light_flux) / (emission.element_sum() / 3.0);
@@ -87,7 +91,9 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
     let mut random = Random::new(PathKind::Photon, path, iteration, settings.seed);
     let mut path = emit(inputs, &mut random);
     for _ in 0..settings.max_depth {
-        let Some(hit) = nearest_hit(inputs, path.ray, FAR, path.ignored) else { return };
+        let Some(hit) = nearest_hit(inputs, path.ray, FAR, path.ignored) else {
+            return;
+        };
         let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
         let material = surface.material;
         let incoming = path.ray.direction;
@@ -110,16 +116,20 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             let outgoing = cosine_direction(facing.geometric_normal, choice, second);
             let scattered = roulette(path.flux, flux * rgb(material.base_color), survival);
-            (outgoing, scattered.filter(|_| outgoing.dot(facing.shading_normal) > 0.0))
+            (
+                outgoing,
+                scattered.filter(|_| outgoing.dot(facing.shading_normal) > 0.0),
+            )
         } else if material.surface == MIRROR {
             let reflected = path.flux * facing.mirror_reflectance(material.base_color, incoming);
             (facing.reflect(incoming), roulette(path.flux, reflected, survival))
         } else {
             let boundary = Boundary::new(&facing, incoming, material.ior);
             match boundary.refracted {
-                Some(refracted) if choice >= boundary.reflectance => {
-                    (refracted, roulette(path.flux, path.flux * rgb(material.base_color), survival))
-                }
+                Some(refracted) if choice >= boundary.reflectance => (
+                    refracted,
+                    roulette(path.flux, path.flux * rgb(material.base_color), survival),
+                ),
                 _ => (boundary.reflected, Some(path.flux)),
             }
         };

@@ -71,8 +71,16 @@ mod tests {
         let n = f64::from(count);
         // Five standard deviations of each mean: 0.289, 0.0745 and 0.0833 over √n.
         assert!((sum / n).abs() < 5.0 * 0.289 / n.sqrt(), "mean {}", sum / n);
-        assert!((squares / n - 1.0 / 12.0).abs() < 5.0 * 0.0745 / n.sqrt(), "variance {}", squares / n);
-        assert!((products / n).abs() < 5.0 * 0.0833 / n.sqrt(), "covariance {}", products / n);
+        assert!(
+            (squares / n - 1.0 / 12.0).abs() < 5.0 * 0.0745 / n.sqrt(),
+            "variance {}",
+            squares / n
+        );
+        assert!(
+            (products / n).abs() < 5.0 * 0.0833 / n.sqrt(),
+            "covariance {}",
+            products / n
+        );
     }
 
     #[test]

@@ -4,7 +4,9 @@ use std::time::Instant;
 
 use bytemuck::Zeroable;
 
-use super::{Batch, Counts, Inputs, camera, compact, direct, gather_kd_tree, photons, reset, resolve, update};
+use super::{
+    Batch, Counts, Inputs, camera, compact, direct, fit_radius, gather_kd_tree, photons, reset, resolve, update,
+};
 use crate::backend::{Backend, Counters, DeviceDescription, settings};
 use crate::config::{DeviceLimits, Estimator, RenderConfig, Sizes};
 use crate::error::Result;
@@ -19,6 +21,11 @@ use crate::scene::{Camera, PackedScene};
 const LANES: u32 = 4096;
 /// Bytes of a batch's photons at the most.
 const PHOTON_BYTES: u64 = 1 << 30;
+
+/// The iteration whose photons the radius is found from; no render gets that far.
+const PILOT: u32 = u32::MAX;
+/// Rounds of shrinking the radius where photons are denser than wanted.
+const FITS: u32 = 2;
 
 /// A progressive render on the CPU, with all threads of rayon's pool.
 pub struct Renderer {
@@ -41,7 +48,7 @@ impl Renderer {
     /// CPU it is a kd-tree.
     ///
     /// # Errors
-    /// A setting outside its range.
+    /// A setting outside its range, or more photons in a batch than the kd-tree can number.
     pub fn new(scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
         config.check()?;
         let limits = DeviceLimits {
@@ -69,8 +76,7 @@ impl Renderer {
             counters: Counters::default(),
             made: Instant::now(),
         };
-        renderer.choose_radius();
-        renderer.statistics = vec![reset(renderer.settings.initial_radius2); slots];
+        renderer.choose_radius()?;
         Ok(renderer)
     }
 
@@ -79,22 +85,45 @@ impl Renderer {
         &self.settings
     }
 
-    /// Takes the user's radius, or finds one from the density of a first batch of photons.
-    fn choose_radius(&mut self) {
-        if self.settings.initial_radius2 == 0.0 {
-            let inputs = Inputs {
-                scene: &self.scene,
-                settings: &self.settings,
-                config: &self.config,
-            };
-            let counts = Counts::default();
-            let visible_points = camera(&inputs, 0, &counts);
-            let photons = compact(&photons(&inputs, batch_of(&self.sizes, &self.config, 0, 0), &counts));
-            let radius = radius::automatic(&visible_points, &photons);
-            // A batch is a part of the iteration's photons; the density is that of the whole.
-            let share = f64::from(self.sizes.batch_paths) / f64::from(self.config.photons);
-            self.settings.initial_radius2 = (radius * radius * share) as f32;
+    /// R², N and τ of each slot.
+    pub fn statistics(&self) -> &[Statistics] {
+        &self.statistics
+    }
+
+    /// Takes the user's radius, or finds one from the density of pilot photons: one for the median visible point, then
+    /// smaller ones where the photons are denser. Resets the statistics.
+    fn choose_radius(&mut self) -> Result<()> {
+        let slots = self.sizes.slots() as usize;
+        if self.config.radius.is_some() {
+            self.statistics = vec![reset(self.settings.initial_radius2); slots];
+            return Ok(());
         }
+        let inputs = Inputs {
+            scene: &self.scene,
+            settings: &self.settings,
+            config: &self.config,
+        };
+        let counts = Counts::default();
+        let visible_points = camera(&inputs, 0, &counts);
+        let photons = compact(&photons(
+            &inputs,
+            batch_of(&self.sizes, &self.config, PILOT, 0),
+            &counts,
+        ));
+        // The pilot is a batch; the densities of the whole iteration's photons are higher.
+        let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
+        let radius = radius::automatic(&visible_points, &photons) as f32;
+        self.settings.initial_radius2 = radius * radius * share;
+        self.statistics = vec![reset(self.settings.initial_radius2); slots];
+        for _ in 0..FITS {
+            gather_kd_tree(&visible_points, &self.statistics, &photons, &mut self.gathered)?;
+            fit_radius(
+                radius::PHOTONS_WANTED as f32 * share,
+                &mut self.gathered,
+                &mut self.statistics,
+            );
+        }
+        Ok(())
     }
 }
 
@@ -123,9 +152,17 @@ impl Backend for Renderer {
             })?;
             self.counters.photons_stored += photons.len() as u64;
         }
-        clock.time("direct", || direct(&inputs, iteration, &self.visible_points, &counts, &mut self.direct_sums));
+        clock.time("direct", || {
+            direct(&inputs, iteration, &self.visible_points, &counts, &mut self.direct_sums)
+        });
         clock.time("update", || {
-            update(&self.visible_points, self.config.alpha, &counts, &mut self.gathered, &mut self.statistics);
+            update(
+                &self.visible_points,
+                self.config.alpha,
+                &counts,
+                &mut self.gathered,
+                &mut self.statistics,
+            );
         });
         self.counters.truncated_paths += counts.truncated_paths();
         self.counters.non_finite += counts.non_finite();
@@ -138,7 +175,11 @@ impl Backend for Renderer {
         let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
         let film = resolve(&self.settings, &self.statistics, &self.direct_sums, iterations, emitted);
         let [width, height] = self.config.resolution.map(|side| side as usize);
-        Ok(Image::new(width, height, film.iter().map(|&[r, g, b, _]| [r, g, b]).collect()))
+        Ok(Image::new(
+            width,
+            height,
+            film.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
+        ))
     }
 
     fn iterations(&self) -> u32 {

@@ -87,7 +87,11 @@ impl Facing {
         Self {
             geometric_normal,
             // Past the shading normal's horizon the geometric normal stands in.
-            shading_normal: if incoming.dot(shading_normal) < 0.0 { shading_normal } else { geometric_normal },
+            shading_normal: if incoming.dot(shading_normal) < 0.0 {
+                shading_normal
+            } else {
+                geometric_normal
+            },
             front,
         }
     }
@@ -99,7 +103,11 @@ impl Facing {
 
     /// Where a ray starts that leaves `position` in `direction`: on the side that it flies to.
     pub fn origin_towards(&self, position: DVec3, direction: DVec3) -> DVec3 {
-        let side = if direction.dot(self.geometric_normal) >= 0.0 { 1.0 } else { -1.0 };
+        let side = if direction.dot(self.geometric_normal) >= 0.0 {
+            1.0
+        } else {
+            -1.0
+        };
         offset_origin(position, side * self.geometric_normal)
     }
 
@@ -126,7 +134,11 @@ impl Boundary {
     /// Snell's law and Fresnel's equations for unpolarised light, between vacuum and an inside of index `ior`.
     pub fn new(facing: &Facing, incoming: DVec3, ior: f32) -> Self {
         let n = facing.shading_normal;
-        let (n_i, n_t) = if facing.front { (1.0, f64::from(ior)) } else { (f64::from(ior), 1.0) };
+        let (n_i, n_t) = if facing.front {
+            (1.0, f64::from(ior))
+        } else {
+            (f64::from(ior), 1.0)
+        };
         let eta = n_i / n_t;
         let cos_i = -incoming.dot(n);
         let sin2_t = eta * eta * (1.0 - cos_i * cos_i).max(0.0);
@@ -188,7 +200,11 @@ mod tests {
         let expected = 0.5 * (brewster.cos().powi(2) - brewster.sin().powi(2)).powi(2);
         assert!((Boundary::new(&facing(true), incoming(brewster), ior).reflectance - expected).abs() < 1e-12);
         let critical = (1.0 / f64::from(ior)).asin();
-        assert!(Boundary::new(&facing(false), incoming(critical - 1e-6), ior).refracted.is_some());
+        assert!(
+            Boundary::new(&facing(false), incoming(critical - 1e-6), ior)
+                .refracted
+                .is_some()
+        );
         let beyond = Boundary::new(&facing(false), incoming(critical + 1e-6), ior);
         assert!(beyond.refracted.is_none() && beyond.reflectance == 1.0);
     }

@@ -15,6 +15,21 @@ pub fn reset(initial_radius2: f32) -> Statistics {
     }
 }
 
+/// Where a gather of pilot photons found more than `wanted`, shrinks the radius until it would hold as many; clears what
+/// was gathered.
+pub fn fit_radius(wanted: f32, gathered: &mut [Gathered], statistics: &mut [Statistics]) {
+    statistics
+        .par_iter_mut()
+        .zip(gathered)
+        .for_each(|(statistics, gathered)| {
+            let share = f64::from(wanted) / f64::from(word(gathered.flux_count));
+            if share < 1.0 {
+                statistics.radius2_high = (f64::from(statistics.radius2_high) * share) as f32;
+            }
+            gathered.flux_count = [0.0; 4];
+        });
+}
+
 /// Takes an iteration's photons into each slot's statistics (equations 2 and 3) and clears them for the next one.
 pub fn update(
     visible_points: &[VisiblePoint],
@@ -23,28 +38,32 @@ pub fn update(
     gathered: &mut [Gathered],
     statistics: &mut [Statistics],
 ) {
-    statistics.par_iter_mut().zip(gathered).zip(visible_points).for_each(|((statistics, gathered), point)| {
-        if word(point.position_object) == NO_OBJECT {
-            return;
-        }
-        let flux = xyz(point.weight_normal) * xyz(gathered.flux_count);
-        let new_photons = word(gathered.flux_count);
-        gathered.flux_count = [0.0; 4];
-        if !flux.is_finite() {
-            counts.add_non_finite(1);
-        } else if new_photons > 0 {
-            let alpha = f64::from(alpha);
-            let accepted = u64::from(statistics.accepted_low) | u64::from(statistics.accepted_high) << 32;
-            let (n, m) = (alpha * accepted as f64, f64::from(new_photons));
-            let ratio = (n + alpha * m) / (n + m);
-            let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low) * ratio;
-            let tau = (from_two_floats(statistics.flux_high, statistics.flux_low) + flux) * ratio;
-            let accepted = accepted + u64::from(new_photons);
-            (statistics.radius2_high, statistics.radius2_low) = to_two_float(radius2);
-            (statistics.flux_high, statistics.flux_low) = to_two_floats(tau);
-            (statistics.accepted_low, statistics.accepted_high) = (accepted as u32, (accepted >> 32) as u32);
-        }
-    });
+    statistics
+        .par_iter_mut()
+        .zip(gathered)
+        .zip(visible_points)
+        .for_each(|((statistics, gathered), point)| {
+            if word(point.position_object) == NO_OBJECT {
+                return;
+            }
+            let flux = xyz(point.weight_normal) * xyz(gathered.flux_count);
+            let new_photons = word(gathered.flux_count);
+            gathered.flux_count = [0.0; 4];
+            if !flux.is_finite() {
+                counts.add_non_finite(1);
+            } else if new_photons > 0 {
+                let alpha = f64::from(alpha);
+                let accepted = u64::from(statistics.accepted_low) | u64::from(statistics.accepted_high) << 32;
+                let (n, m) = (alpha * accepted as f64, f64::from(new_photons));
+                let ratio = (n + alpha * m) / (n + m);
+                let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low) * ratio;
+                let tau = (from_two_floats(statistics.flux_high, statistics.flux_low) + flux) * ratio;
+                let accepted = accepted + u64::from(new_photons);
+                (statistics.radius2_high, statistics.radius2_low) = to_two_float(radius2);
+                (statistics.flux_high, statistics.flux_low) = to_two_floats(tau);
+                (statistics.accepted_low, statistics.accepted_high) = (accepted as u32, (accepted >> 32) as u32);
+            }
+        });
 }
 
 /// The radii of each group of `group` slots, from which the device chooses the next grid.

@@ -30,7 +30,10 @@ impl Buffer {
         let create = vk::BufferCreateInfo::default().size(bytes.max(4)).usage(usage);
         // SAFETY: the context outlives the buffer: Device frees its buffers before the context.
         unsafe {
-            let handle = context.device.create_buffer(&create, None).or_vulkan("vkCreateBuffer")?;
+            let handle = context
+                .device
+                .create_buffer(&create, None)
+                .or_vulkan("vkCreateBuffer")?;
             let requirements = context.device.get_buffer_memory_requirements(handle);
             let allocation = context
                 .allocator
@@ -55,7 +58,12 @@ impl Buffer {
                 .bind_buffer_memory(handle, allocation.memory(), allocation.offset())
                 .or_vulkan("vkBindBufferMemory")?;
             context.name(handle, name);
-            Ok(Self { handle, bytes: bytes.max(4), texels: None, allocation: Some(allocation) })
+            Ok(Self {
+                handle,
+                bytes: bytes.max(4),
+                texels: None,
+                allocation: Some(allocation),
+            })
         }
     }
 
@@ -76,7 +84,10 @@ impl Buffer {
 
     /// The memory of a host-visible buffer.
     pub fn mapped(&mut self) -> &mut [u8] {
-        self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).unwrap_or_default()
+        self.allocation
+            .as_mut()
+            .and_then(Allocation::mapped_slice_mut)
+            .unwrap_or_default()
     }
 
     /// Gives the buffer back. The device must not be using it.

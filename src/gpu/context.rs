@@ -2,7 +2,7 @@
 
 use std::ffi::{CStr, CString, c_void};
 use std::mem::ManuallyDrop;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use ash::{ext, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
@@ -21,7 +21,10 @@ pub(super) trait OrVulkan<T> {
 
 impl<T> OrVulkan<T> for std::result::Result<T, vk::Result> {
     fn or_vulkan(self, call: &'static str) -> Result<T> {
-        self.map_err(|code| Error::Vulkan { call, code: format!("{code} ({code:?})") })
+        self.map_err(|code| Error::Vulkan {
+            call,
+            code: format!("{code} ({code:?})"),
+        })
     }
 }
 
@@ -68,7 +71,11 @@ unsafe extern "system" fn on_message(
 ) -> vk::Bool32 {
     // SAFETY: the layer passes valid data, and `messages` outlives the messenger (see Instance).
     unsafe {
-        let text = (*data).message_as_c_str().unwrap_or(c"(no text)").to_string_lossy().into_owned();
+        let text = (*data)
+            .message_as_c_str()
+            .unwrap_or(c"(no text)")
+            .to_string_lossy()
+            .into_owned();
         let messages = &*messages.cast::<Mutex<Vec<String>>>();
         if let Ok(mut messages) = messages.lock() {
             messages.push(text);
@@ -77,9 +84,24 @@ unsafe extern "system" fn on_message(
     vk::FALSE
 }
 
+/// The instance that is alive, if one is. Loaders have been seen to crash where one thread makes an instance while
+/// another names an object.
+static SHARED: Mutex<Weak<Instance>> = Mutex::new(Weak::new());
+
 impl Instance {
+    /// The process's one instance.
+    pub fn shared() -> Result<Arc<Self>> {
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(instance) = shared.upgrade() {
+            return Ok(instance);
+        }
+        let instance = Arc::new(Self::new()?);
+        *shared = Arc::downgrade(&instance);
+        Ok(instance)
+    }
+
     /// Loads Vulkan. Debug builds turn on the validation layer where it is installed.
-    pub fn new() -> Result<Self> {
+    fn new() -> Result<Self> {
         // SAFETY: the loader is the system's own.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| {
             Error::Device(format!(
@@ -89,16 +111,28 @@ impl Instance {
         let messages = Messages::default();
         // SAFETY: plain Vulkan calls on a live entry; pointers outlive the calls.
         unsafe {
-            let layers = entry.enumerate_instance_layer_properties().or_vulkan("vkEnumerateInstanceLayerProperties")?;
+            let layers = entry
+                .enumerate_instance_layer_properties()
+                .or_vulkan("vkEnumerateInstanceLayerProperties")?;
             let validate = cfg!(debug_assertions)
-                && layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
+                && layers
+                    .iter()
+                    .any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
             let extensions = entry
                 .enumerate_instance_extension_properties(None)
                 .or_vulkan("vkEnumerateInstanceExtensionProperties")?;
-            let debug_utils =
-                validate || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
-            let application = vk::ApplicationInfo::default().application_name(c"ppm-vk").api_version(API_VERSION);
-            let layer_names = if validate { vec![VALIDATION_LAYER.as_ptr()] } else { Vec::new() };
+            let debug_utils = validate
+                || extensions
+                    .iter()
+                    .any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+            let application = vk::ApplicationInfo::default()
+                .application_name(c"ppm-vk")
+                .api_version(API_VERSION);
+            let layer_names = if validate {
+                vec![VALIDATION_LAYER.as_ptr()]
+            } else {
+                Vec::new()
+            };
             let mut extension_names = Vec::new();
             if debug_utils {
                 extension_names.push(ext::debug_utils::NAME.as_ptr());
@@ -116,7 +150,9 @@ impl Instance {
                 create = create.push_next(&mut features);
             }
             let handle = entry.create_instance(&create, None).map_err(|code| {
-                Error::Device(format!("no Vulkan instance: {code}; is a Vulkan driver installed? (or --backend cpu)"))
+                Error::Device(format!(
+                    "no Vulkan instance: {code}; is a Vulkan driver installed? (or --backend cpu)"
+                ))
             })?;
             let debug = if validate {
                 let debug = ext::debug_utils::Instance::new(&entry, &handle);
@@ -125,8 +161,7 @@ impl Instance {
                         vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
                     )
                     .message_type(
-                        vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
-                            | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
+                        vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
                     )
                     .pfn_user_callback(Some(on_message))
                     .user_data(Arc::as_ptr(&messages).cast_mut().cast());
@@ -137,7 +172,12 @@ impl Instance {
             } else {
                 None
             };
-            Ok(Self { _entry: entry, handle, debug, messages })
+            Ok(Self {
+                _entry: entry,
+                handle,
+                debug,
+                messages,
+            })
         }
     }
 
@@ -145,14 +185,19 @@ impl Instance {
     pub fn devices(&self) -> Result<Vec<(vk::PhysicalDevice, DeviceSummary)>> {
         // SAFETY: the instance is live.
         let devices = unsafe { self.handle.enumerate_physical_devices() }.or_vulkan("vkEnumeratePhysicalDevices")?;
-        Ok(devices.into_iter().enumerate().map(|(index, device)| (device, self.summary(index, device))).collect())
+        Ok(devices
+            .into_iter()
+            .enumerate()
+            .map(|(index, device)| (device, self.summary(index, device)))
+            .collect())
     }
 
     fn summary(&self, index: usize, device: vk::PhysicalDevice) -> DeviceSummary {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut properties =
-            vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut driver);
+        let mut properties = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut subgroup)
+            .push_next(&mut driver);
         // SAFETY: the device belongs to this instance.
         unsafe { self.handle.get_physical_device_properties2(device, &mut properties) };
         let properties = properties.properties;
@@ -208,9 +253,17 @@ impl Instance {
     pub fn compute_family(&self, device: vk::PhysicalDevice) -> Option<(u32, u32)> {
         // SAFETY: the device belongs to this instance.
         let families = unsafe { self.handle.get_physical_device_queue_family_properties(device) };
-        let computes = families.iter().enumerate().filter(|(_, f)| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
+        let computes = families
+            .iter()
+            .enumerate()
+            .filter(|(_, f)| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
         computes
-            .min_by_key(|(_, f)| (f.timestamp_valid_bits == 0, f.queue_flags.contains(vk::QueueFlags::GRAPHICS)))
+            .min_by_key(|(_, f)| {
+                (
+                    f.timestamp_valid_bits == 0,
+                    f.queue_flags.contains(vk::QueueFlags::GRAPHICS),
+                )
+            })
             .map(|(index, family)| (index as u32, family.timestamp_valid_bits))
     }
 }
@@ -236,22 +289,30 @@ pub(super) struct Context {
     pub family: u32,
     pub timestamp_bits: u32,
     debug: Option<ext::debug_utils::Device>,
-    pub instance: Instance,
+    pub instance: Arc<Instance>,
 }
 
 impl Context {
-    pub fn new(instance: Instance, physical: vk::PhysicalDevice) -> Result<Self> {
+    pub fn new(instance: Arc<Instance>, physical: vk::PhysicalDevice) -> Result<Self> {
         let (family, timestamp_bits) = instance
             .compute_family(physical)
             .ok_or_else(|| Error::Device("the device has no compute queue".to_owned()))?;
         let priorities = [1.0];
-        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(family)
+            .queue_priorities(&priorities)];
         let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
         // SAFETY: the physical device belongs to the instance, which the context keeps alive.
         unsafe {
-            let device = instance.handle.create_device(physical, &create, None).or_vulkan("vkCreateDevice")?;
+            let device = instance
+                .handle
+                .create_device(physical, &create, None)
+                .or_vulkan("vkCreateDevice")?;
             let queue = device.get_device_queue(family, 0);
-            let debug = instance.debug.is_some().then(|| ext::debug_utils::Device::new(&instance.handle, &device));
+            let debug = instance
+                .debug
+                .is_some()
+                .then(|| ext::debug_utils::Device::new(&instance.handle, &device));
             let allocator = Allocator::new(&AllocatorCreateDesc {
                 instance: instance.handle.clone(),
                 device: device.clone(),
@@ -276,7 +337,9 @@ impl Context {
     /// Names an object for debuggers and the validation layer.
     pub fn name<H: vk::Handle>(&self, handle: H, name: &str) {
         if let (Some(debug), Ok(name)) = (&self.debug, CString::new(name)) {
-            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+            let info = vk::DebugUtilsObjectNameInfoEXT::default()
+                .object_handle(handle)
+                .object_name(&name);
             // SAFETY: the handle is alive: its creator calls this. A failure costs the name alone.
             let _ = unsafe { debug.set_debug_utils_object_name(&info) };
         }
@@ -301,7 +364,11 @@ impl Context {
 
     /// What the validation layer said since the last call.
     pub fn take_messages(&self) -> Vec<String> {
-        self.instance.messages.lock().map(|mut messages| std::mem::take(&mut *messages)).unwrap_or_default()
+        self.instance
+            .messages
+            .lock()
+            .map(|mut messages| std::mem::take(&mut *messages))
+            .unwrap_or_default()
     }
 }
 

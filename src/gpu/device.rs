@@ -17,7 +17,11 @@ use crate::stage::BufferId;
 /// # Errors
 /// No loader or no instance.
 pub fn devices() -> Result<Vec<DeviceSummary>> {
-    Ok(Instance::new()?.devices()?.into_iter().map(|(_, summary)| summary).collect())
+    Ok(Instance::shared()?
+        .devices()?
+        .into_iter()
+        .map(|(_, summary)| summary)
+        .collect())
 }
 
 /// An open device and its buffers.
@@ -41,7 +45,7 @@ impl Device {
     /// # Errors
     /// No loader, no such device, or one that lacks what the program needs.
     pub fn open(choice: Option<&str>) -> Result<Self> {
-        let instance = Instance::new()?;
+        let instance = Instance::shared()?;
         let devices = instance.devices()?;
         let (physical, summary) = choose(devices, choice)?;
         if !summary.lacks.is_empty() {
@@ -58,10 +62,17 @@ impl Device {
             let create = vk::CommandPoolCreateInfo::default()
                 .queue_family_index(context.family)
                 .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
-            let pool = context.device.create_command_pool(&create, None).or_vulkan("vkCreateCommandPool")?;
-            let allocate = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-            let commands =
-                context.device.allocate_command_buffers(&allocate).or_vulkan("vkAllocateCommandBuffers")?[0];
+            let pool = context
+                .device
+                .create_command_pool(&create, None)
+                .or_vulkan("vkCreateCommandPool")?;
+            let allocate = vk::CommandBufferAllocateInfo::default()
+                .command_pool(pool)
+                .command_buffer_count(1);
+            let commands = context
+                .device
+                .allocate_command_buffers(&allocate)
+                .or_vulkan("vkAllocateCommandBuffers")?[0];
             let fence = context
                 .device
                 .create_fence(&vk::FenceCreateInfo::default(), None)
@@ -126,14 +137,17 @@ impl Device {
         if bytes.is_empty() {
             return Ok(());
         }
-        let mut staging =
-            Buffer::new(&self.context, "staging", bytes.len() as u64, MemoryLocation::CpuToGpu)?;
+        let mut staging = Buffer::new(&self.context, "staging", bytes.len() as u64, MemoryLocation::CpuToGpu)?;
         staging.mapped()[..bytes.len()].copy_from_slice(bytes);
         let target = self.buffers[&id].handle;
         let result = self.submit(|context, commands| {
             let region = vk::BufferCopy::default().size(bytes.len() as u64);
             // SAFETY: both buffers hold that many bytes and live until the submission has been waited for.
-            unsafe { context.device.cmd_copy_buffer(commands, staging.handle, target, &[region]) };
+            unsafe {
+                context
+                    .device
+                    .cmd_copy_buffer(commands, staging.handle, target, &[region])
+            };
             Ok(())
         });
         staging.free(&self.context);
@@ -155,8 +169,10 @@ fn choose(
     mut devices: Vec<(vk::PhysicalDevice, DeviceSummary)>,
     choice: Option<&str>,
 ) -> Result<(vk::PhysicalDevice, DeviceSummary)> {
-    let names: Vec<String> =
-        devices.iter().map(|(_, summary)| format!("{}: {}", summary.index, summary.name)).collect();
+    let names: Vec<String> = devices
+        .iter()
+        .map(|(_, summary)| format!("{}: {}", summary.index, summary.name))
+        .collect();
     if names.is_empty() {
         return Err(Error::Device(
             "no Vulkan device; install a driver (Debian: mesa-vulkan-drivers) or use --backend cpu".to_owned(),
@@ -172,11 +188,19 @@ fn choose(
         None => (0..devices.len()).min_by_key(|&i| {
             let summary = &devices[i].1;
             let rank = ["discrete", "integrated", "virtual", "other", "cpu"];
-            (!summary.lacks.is_empty(), rank.iter().position(|kind| *kind == summary.kind), i)
+            (
+                !summary.lacks.is_empty(),
+                rank.iter().position(|kind| *kind == summary.kind),
+                i,
+            )
         }),
     };
     let position = position.ok_or_else(|| {
-        Error::Device(format!("no device matches --device {}; there are {}", choice.unwrap_or(""), names.join(", ")))
+        Error::Device(format!(
+            "no device matches --device {}; there are {}",
+            choice.unwrap_or(""),
+            names.join(", ")
+        ))
     })?;
     Ok(devices.swap_remove(position))
 }

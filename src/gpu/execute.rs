@@ -87,7 +87,10 @@ impl Device {
             }
             Ok(())
         })?;
-        Ok(Run { launches: self.launches(stages, scratch)?, wall })
+        Ok(Run {
+            launches: self.launches(stages, scratch)?,
+            wall,
+        })
     }
 
     fn launches(&self, stages: &[&StageDesc], scratch: &Scratch) -> Result<Vec<Launch>> {
@@ -97,8 +100,12 @@ impl Device {
         let mut ticks = vec![0u64; 2 * stages.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the queries were written by work that has been waited for.
-        unsafe { self.context.device.get_query_pool_results(scratch.queries, 0, &mut ticks, flags) }
-            .or_vulkan("vkGetQueryPoolResults")?;
+        unsafe {
+            self.context
+                .device
+                .get_query_pool_results(scratch.queries, 0, &mut ticks, flags)
+        }
+        .or_vulkan("vkGetQueryPoolResults")?;
         let mask = u64::MAX >> (64 - self.context.timestamp_bits.clamp(1, 64));
         let period = f64::from(self.summary.timestamp_period_ns);
         Ok(stages
@@ -119,7 +126,9 @@ impl Device {
     pub fn download<T: bytemuck::AnyBitPattern>(&mut self, id: BufferId, count: Option<usize>) -> Result<Vec<T>> {
         let source = self.handle(id)?;
         let available = self.size(id);
-        let bytes = count.map_or(available, |count| (count * size_of::<T>()) as u64).min(available);
+        let bytes = count
+            .map_or(available, |count| (count * size_of::<T>()) as u64)
+            .min(available);
         if bytes == 0 {
             return Ok(Vec::new());
         }
@@ -128,7 +137,8 @@ impl Device {
                 old.free(&self.context);
             }
             let name = format!("{id:?} read back");
-            self.read_back.insert(id, Buffer::new(&self.context, &name, bytes, MemoryLocation::GpuToCpu)?);
+            self.read_back
+                .insert(id, Buffer::new(&self.context, &name, bytes, MemoryLocation::GpuToCpu)?);
         }
         let target = self.read_back[&id].handle;
         self.submit(|context, commands| {
@@ -153,7 +163,10 @@ impl Device {
         })?;
         let mapped = self.read_back.get_mut(&id).map(Buffer::mapped).unwrap_or_default();
         let whole = bytes as usize / size_of::<T>() * size_of::<T>();
-        Ok(mapped[..whole].chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
+        Ok(mapped[..whole]
+            .chunks_exact(size_of::<T>())
+            .map(bytemuck::pod_read_unaligned)
+            .collect())
     }
 
     pub(super) fn submit(&self, record: impl FnOnce(&Context, vk::CommandBuffer) -> Result<()>) -> Result<Duration> {
@@ -179,7 +192,9 @@ fn submit(
     let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
     // SAFETY: the command buffer isn't in use: every submission is waited for before the next one.
     let wall = unsafe {
-        device.begin_command_buffer(commands, &begin).or_vulkan("vkBeginCommandBuffer")?;
+        device
+            .begin_command_buffer(commands, &begin)
+            .or_vulkan("vkBeginCommandBuffer")?;
         // What the host or an earlier submission wrote.
         barrier(context, commands);
         record(context, commands)?;
@@ -187,9 +202,15 @@ fn submit(
         let buffers = [commands];
         let start = Instant::now();
         device
-            .queue_submit(context.queue, &[vk::SubmitInfo::default().command_buffers(&buffers)], fence)
+            .queue_submit(
+                context.queue,
+                &[vk::SubmitInfo::default().command_buffers(&buffers)],
+                fence,
+            )
             .or_vulkan("vkQueueSubmit")?;
-        device.wait_for_fences(&[fence], true, u64::MAX).or_vulkan("vkWaitForFences")?;
+        device
+            .wait_for_fences(&[fence], true, u64::MAX)
+            .or_vulkan("vkWaitForFences")?;
         let wall = start.elapsed();
         device.reset_fences(&[fence]).or_vulkan("vkResetFences")?;
         wall
@@ -216,7 +237,9 @@ fn barrier(context: &Context, commands: vk::CommandBuffer) {
     // SAFETY: the command buffer is recording.
     unsafe {
         let none = vk::DependencyFlags::empty();
-        context.device.cmd_pipeline_barrier(commands, stages, stages, none, &[barrier], &[], &[]);
+        context
+            .device
+            .cmd_pipeline_barrier(commands, stages, stages, none, &[barrier], &[], &[]);
     }
 }
 
@@ -229,8 +252,11 @@ struct Scratch {
 
 impl Scratch {
     fn new(device: &mut Device, stages: &[&StageDesc]) -> Result<Self> {
-        let mut scratch =
-            Self { pool: vk::DescriptorPool::null(), sets: Vec::new(), queries: vk::QueryPool::null() };
+        let mut scratch = Self {
+            pool: vk::DescriptorPool::null(),
+            sets: Vec::new(),
+            queries: vk::QueryPool::null(),
+        };
         if stages.is_empty() {
             return Ok(scratch);
         }
@@ -247,7 +273,9 @@ impl Scratch {
     fn fill(&mut self, device: &mut Device, stages: &[&StageDesc]) -> Result<()> {
         let count = |access_type: vk::DescriptorType| {
             let all = stages.iter().flat_map(|stage| stage.uses());
-            all.filter(|(_, _, access)| descriptor_type(*access) == access_type).count().max(1) as u32
+            all.filter(|(_, _, access)| descriptor_type(*access) == access_type)
+                .count()
+                .max(1) as u32
         };
         let sizes = [
             vk::DescriptorType::STORAGE_BUFFER,
@@ -262,11 +290,18 @@ impl Scratch {
         let vulkan = &device.context.device;
         // SAFETY: plain creation calls; `free` destroys what they make.
         unsafe {
-            let create = vk::DescriptorPoolCreateInfo::default().max_sets(stages.len() as u32).pool_sizes(&sizes);
-            self.pool = vulkan.create_descriptor_pool(&create, None).or_vulkan("vkCreateDescriptorPool")?;
-            let allocate =
-                vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
-            self.sets = vulkan.allocate_descriptor_sets(&allocate).or_vulkan("vkAllocateDescriptorSets")?;
+            let create = vk::DescriptorPoolCreateInfo::default()
+                .max_sets(stages.len() as u32)
+                .pool_sizes(&sizes);
+            self.pool = vulkan
+                .create_descriptor_pool(&create, None)
+                .or_vulkan("vkCreateDescriptorPool")?;
+            let allocate = vk::DescriptorSetAllocateInfo::default()
+                .descriptor_pool(self.pool)
+                .set_layouts(&layouts);
+            self.sets = vulkan
+                .allocate_descriptor_sets(&allocate)
+                .or_vulkan("vkAllocateDescriptorSets")?;
             let create = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2 * stages.len() as u32);
@@ -278,7 +313,9 @@ impl Scratch {
                 let buffer = device.buffers.get_mut(&id).ok_or_else(|| {
                     Error::Device(format!("stage {} uses {id:?} before it is made", stage.shader.name))
                 })?;
-                let info = [vk::DescriptorBufferInfo::default().buffer(buffer.handle).range(vk::WHOLE_SIZE)];
+                let info = [vk::DescriptorBufferInfo::default()
+                    .buffer(buffer.handle)
+                    .range(vk::WHOLE_SIZE)];
                 let mut write = vk::WriteDescriptorSet::default()
                     .dst_set(*set)
                     .dst_binding(slot)

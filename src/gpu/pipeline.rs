@@ -60,7 +60,11 @@ impl Pipelines {
             .1
             .iter()
             .enumerate()
-            .map(|(i, (id, _))| vk::SpecializationMapEntry { constant_id: *id, offset: 4 * i as u32, size: 4 })
+            .map(|(i, (id, _))| vk::SpecializationMapEntry {
+                constant_id: *id,
+                offset: 4 * i as u32,
+                size: 4,
+            })
             .collect();
         let data: Vec<u8> = key.1.iter().flat_map(|(_, value)| value.to_ne_bytes()).collect();
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
@@ -69,15 +73,25 @@ impl Pipelines {
             .module(layouts.module)
             .name(c"main")
             .specialization_info(&specialization);
-        let create = vk::ComputePipelineCreateInfo::default().stage(stage_info).layout(layouts.pipeline);
+        let create = vk::ComputePipelineCreateInfo::default()
+            .stage(stage_info)
+            .layout(layouts.pipeline);
         // SAFETY: module and layout are alive; the context outlives the pipeline.
-        let handle = unsafe { context.device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) }
-            .map_err(|(_, code)| Error::Vulkan {
-                call: "vkCreateComputePipelines",
-                code: format!("{code} (stage {})", shader.name),
-            })?[0];
+        let handle = unsafe {
+            context
+                .device
+                .create_compute_pipelines(vk::PipelineCache::null(), &[create], None)
+        }
+        .map_err(|(_, code)| Error::Vulkan {
+            call: "vkCreateComputePipelines",
+            code: format!("{code} (stage {})", shader.name),
+        })?[0];
         context.name(handle, shader.name);
-        let pipeline = Pipeline { handle, layout: layouts.pipeline, set_layout: layouts.set };
+        let pipeline = Pipeline {
+            handle,
+            layout: layouts.pipeline,
+            set_layout: layouts.set,
+        };
         self.pipelines.insert(key, pipeline);
         Ok(pipeline)
     }
@@ -115,7 +129,9 @@ fn layouts(context: &Context, shader: &Shader) -> Result<Layouts> {
         .push_constants
         .iter()
         .map(|block| {
-            vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(block.size() as u32)
+            vk::PushConstantRange::default()
+                .stage_flags(vk::ShaderStageFlags::COMPUTE)
+                .size(block.size() as u32)
         })
         .collect();
     // SAFETY: plain creation calls; the context outlives what they make.
@@ -129,9 +145,13 @@ fn layouts(context: &Context, shader: &Shader) -> Result<Layouts> {
             .create_descriptor_set_layout(&vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings), None)
             .or_vulkan("vkCreateDescriptorSetLayout")?;
         let sets = [set];
-        let create = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&ranges);
-        let pipeline =
-            context.device.create_pipeline_layout(&create, None).or_vulkan("vkCreatePipelineLayout")?;
+        let create = vk::PipelineLayoutCreateInfo::default()
+            .set_layouts(&sets)
+            .push_constant_ranges(&ranges);
+        let pipeline = context
+            .device
+            .create_pipeline_layout(&create, None)
+            .or_vulkan("vkCreatePipelineLayout")?;
         context.name(module, shader.name);
         context.name(set, shader.name);
         context.name(pipeline, shader.name);

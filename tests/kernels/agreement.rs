@@ -28,7 +28,13 @@ impl Agreement {
     /// Fails if too few agreed, or too few were compared for the share to mean anything.
     pub fn assert(&self, what: &str, least_share: f64, least_compared: usize) {
         let share = (self.compared - self.differing) as f64 / self.compared.max(1) as f64;
-        println!("{what}: {} of {} differ ({:.4} % agree){}", self.differing, self.compared, share * 100.0, self.first);
+        println!(
+            "{what}: {} of {} differ ({:.4} % agree){}",
+            self.differing,
+            self.compared,
+            share * 100.0,
+            self.first
+        );
         assert!(
             self.compared >= least_compared,
             "{what}: only {} compared, {least_compared} expected: does the scene still show what the test is about?",
@@ -47,5 +53,9 @@ impl Agreement {
 
 /// |a − b| over the larger magnitude; 0 for two zeros.
 pub fn relative_difference(a: f64, b: f64) -> f64 {
-    if a == b { 0.0 } else { (a - b).abs() / a.abs().max(b.abs()) }
+    if a == b {
+        0.0
+    } else {
+        (a - b).abs() / a.abs().max(b.abs())
+    }
 }

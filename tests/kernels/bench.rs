@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use glam::DVec3;
+use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
 use ppm_vk::gpu::Device;
@@ -13,7 +14,10 @@ use ppm_vk::stage::BufferId;
 
 /// A scene of `scenes/`.
 pub fn scene(name: &str) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("gltf");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenes")
+        .join(name)
+        .with_extension("gltf");
     Scene::load(&path).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -71,7 +75,10 @@ impl Bench {
 
     /// Makes a buffer of the device hold this.
     pub fn upload<T: bytemuck::NoUninit>(&mut self, id: BufferId, data: &[T]) {
-        self.renderer.device().upload(id, data).unwrap_or_else(|error| panic!("{id:?}: {error}"));
+        self.renderer
+            .gpu()
+            .upload(id, data)
+            .unwrap_or_else(|error| panic!("{id:?}: {error}"));
     }
 
     /// The photons of the last batch.
@@ -84,7 +91,10 @@ impl Bench {
 }
 
 fn download<T: bytemuck::AnyBitPattern>(renderer: &mut Renderer, id: BufferId) -> Vec<T> {
-    renderer.device().download(id, None).unwrap_or_else(|error| panic!("{id:?}: {error}"))
+    renderer
+        .gpu()
+        .download(id, None)
+        .unwrap_or_else(|error| panic!("{id:?}: {error}"))
 }
 
 /// The first three of four, in f64.
@@ -121,5 +131,9 @@ pub fn photon(position: [f32; 3], object: u32, flux: [f32; 3]) -> Photon {
 
 /// `count` numbers in [0, 1) in sets of four, the same in every run.
 pub fn random_numbers(count: u32) -> impl Iterator<Item = [f32; 4]> {
-    (0..count).map(|i| cpu::Random::new(cpu::PathKind::Camera, i, 0, 0xbe9c).next4().map(|number| number as f32))
+    (0..count).map(|i| {
+        cpu::Random::new(cpu::PathKind::Camera, i, 0, 0xbe9c)
+            .next4()
+            .map(|number| number as f32)
+    })
 }

@@ -2,8 +2,8 @@
 
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu::{self, Counts};
-use ppm_vk::gather::METHODS;
-use ppm_vk::layout::{Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::gather::{GatherMethod, METHODS};
+use ppm_vk::layout::{GATHERS_TOO_LONG, Gathered, Photon, Statistics, StatusCounters, VisiblePoint};
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
@@ -18,7 +18,10 @@ fn with_radius(count: usize, radius2: f32) -> Vec<Statistics> {
 
 /// M of each slot.
 fn counts(gathered: &[Gathered]) -> Vec<u32> {
-    gathered.iter().map(|gathered| gathered.flux_count[3].to_bits()).collect()
+    gathered
+        .iter()
+        .map(|gathered| gathered.flux_count[3].to_bits())
+        .collect()
 }
 
 /// Gathers with every method on the device, updates the statistics, and compares both with the CPU's. Returns M.
@@ -29,12 +32,25 @@ fn assert_methods_agree(
     statistics: &[Statistics],
     photons: &[Photon],
 ) -> Vec<u32> {
-    assert_eq!(points.len(), bench.renderer.sizes().slots() as usize, "one visible point a slot");
-    assert!(photons.len() <= bench.renderer.sizes().photon_capacity() as usize, "more photons than the buffers hold");
+    assert_eq!(
+        points.len(),
+        bench.renderer.sizes().slots() as usize,
+        "one visible point a slot"
+    );
+    assert!(
+        photons.len() <= bench.renderer.sizes().photon_capacity() as usize,
+        "more photons than the buffers hold"
+    );
     let mut expected = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
     cpu::gather_naive(points, statistics, photons, &mut expected);
     let mut updated = statistics.to_vec();
-    cpu::update(points, bench.config.alpha, &Counts::default(), &mut expected.clone(), &mut updated);
+    cpu::update(
+        points,
+        bench.config.alpha,
+        &Counts::default(),
+        &mut expected.clone(),
+        &mut updated,
+    );
 
     bench.upload(BufferId::VisiblePoints, points);
     bench.upload(BufferId::Photons, photons);
@@ -44,20 +60,46 @@ fn assert_methods_agree(
         let what = format!("{case}, {}", method.name);
         bench.upload(BufferId::StatisticsOf, statistics);
         bench.upload(BufferId::RadiusSums, &radius_sums);
-        let mut recording = Recording::new();
-        recording.fill(BufferId::GatheredOf, 0);
-        (method.record)(bench.renderer.sizes(), &mut recording);
-        bench.renderer.device().run(&recording).unwrap_or_else(|error| panic!("{what}: {error}"));
-        let found: Vec<Gathered> = bench.download(BufferId::GatheredOf);
+        let found = gather(bench, method, &what);
         assert_same_photons(&what, &found, &expected);
 
         let mut recording = Recording::new();
         recording.dispatch(StageDesc::new(&shaders::UPDATE, points.len() as u32));
-        bench.renderer.device().run(&recording).unwrap_or_else(|error| panic!("{what}: {error}"));
+        bench
+            .renderer
+            .gpu()
+            .run(&recording)
+            .unwrap_or_else(|error| panic!("{what}: {error}"));
         let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
         assert_same_statistics(&what, &found, &updated);
     }
     counts(&expected)
+}
+
+/// What a method gathers; like the renderer it takes smaller parts where the driver cuts loops.
+fn gather(bench: &mut Bench, method: &GatherMethod, what: &str) -> Vec<Gathered> {
+    let mut sizes = *bench.renderer.sizes();
+    loop {
+        let mut recording = Recording::new();
+        recording.fill(BufferId::Status, 0);
+        recording.fill(BufferId::GatheredOf, 0);
+        (method.record)(&sizes, &mut recording);
+        bench
+            .renderer
+            .gpu()
+            .run(&recording)
+            .unwrap_or_else(|error| panic!("{what}: {error}"));
+        let status: Vec<StatusCounters> = bench.download(BufferId::Status);
+        if status[0].again & GATHERS_TOO_LONG == 0 {
+            return bench.download(BufferId::GatheredOf);
+        }
+        assert!(
+            sizes.gather_parts < 1024,
+            "{what}: cut even in {} parts",
+            sizes.gather_parts
+        );
+        sizes.gather_parts *= 2;
+    }
 }
 
 fn assert_same_photons(what: &str, found: &[Gathered], expected: &[Gathered]) {
@@ -69,12 +111,19 @@ fn assert_same_photons(what: &str, found: &[Gathered], expected: &[Gathered]) {
 fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[Statistics]) {
     for (slot, (found, expected)) in found.iter().zip(expected).enumerate() {
         let accepted = |s: &Statistics| (s.accepted_low, s.accepted_high);
-        assert_eq!(accepted(found), accepted(expected), "{what}, slot {slot}: photons accepted");
+        assert_eq!(
+            accepted(found),
+            accepted(expected),
+            "{what}, slot {slot}: photons accepted"
+        );
         // Sums of f32, added up in another order: √M roundings.
         let (tau, expected_tau) = (xyz(found.flux_high), xyz(expected.flux_high));
         for (tau, expected) in tau.to_array().into_iter().zip(expected_tau.to_array()) {
             let difference = relative_difference(tau, expected);
-            assert!(difference <= 1e-5, "{what}, slot {slot}: τ {tau} on the device, {expected} on the CPU");
+            assert!(
+                difference <= 1e-5,
+                "{what}, slot {slot}: τ {tau} on the device, {expected} on the CPU"
+            );
         }
     }
 }
@@ -91,9 +140,9 @@ fn all_methods_agree_on_traced_photons_at_any_radius() {
         let m = assert_methods_agree(&mut bench, &case, &points, &statistics, &photons);
         means.push(m.iter().map(|&m| f64::from(m)).sum::<f64>() / m.len() as f64);
     }
-    // The radius is chosen for ten photons.
+    // The radius is chosen for fifteen photons.
     println!("mean M at a quarter of, at, and at four times the automatic radius: {means:?}");
-    assert!(means[1] > 5.0 && means[1] < 20.0, "mean M {means:?}");
+    assert!(means[1] > 7.0 && means[1] < 30.0, "mean M {means:?}");
     assert!(means[0] < means[1] && means[1] < means[2], "mean M {means:?}");
 }
 
@@ -105,7 +154,13 @@ fn all_methods_agree_where_radii_differ() {
     let statistics: Vec<Statistics> = random_numbers(points.len() as u32)
         .map(|[u, ..]| cpu::reset((radius * 4f32.powf(2.0 * u - 1.0)).powi(2)))
         .collect();
-    assert_methods_agree(&mut bench, "radii from a quarter to four times", &points, &statistics, &photons);
+    assert_methods_agree(
+        &mut bench,
+        "radii from a quarter to four times",
+        &points,
+        &statistics,
+        &photons,
+    );
 }
 
 /// 8×8 visible points, room for more than 65,535 photons.
@@ -121,7 +176,9 @@ fn tiny() -> RenderConfig {
 /// A visible point for each slot, on object 0 in the plane z = 0.
 fn plane(bench: &Bench) -> Vec<VisiblePoint> {
     let slots = bench.renderer.sizes().slots();
-    random_numbers(slots).map(|[x, y, ..]| visible_point([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], 0)).collect()
+    random_numbers(slots)
+        .map(|[x, y, ..]| visible_point([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], 0))
+        .collect()
 }
 
 #[test]
@@ -148,7 +205,13 @@ fn a_photon_at_distance_r_counts_and_the_next_one_beyond_does_not() {
         let [x, y, z] = [grid(x), grid(y), grid(z)];
         points.push(visible_point([x, y, z], slot));
         let flux = [1.0; 3];
-        for (dx, dy, dz) in [(5.0, 0.0, 0.0), (-5.0, 0.0, 0.0), (0.0, 4.0, -3.0), (-3.0, 0.0, 4.0), (-4.0, -3.0, 0.0)] {
+        for (dx, dy, dz) in [
+            (5.0, 0.0, 0.0),
+            (-5.0, 0.0, 0.0),
+            (0.0, 4.0, -3.0),
+            (-3.0, 0.0, 4.0),
+            (-4.0, -3.0, 0.0),
+        ] {
             let [dx, dy, dz]: [f32; 3] = [dx / 64.0, dy / 64.0, dz / 64.0];
             photons.push(photon([x + dx, y + dy, z + dz], slot, flux));
         }

@@ -19,14 +19,18 @@ fn random_words(count: usize, seed: u32) -> Vec<u32> {
 fn first_difference(found: &[u32], expected: &[u32]) -> Option<(usize, u32, u32)> {
     assert_eq!(found.len(), expected.len());
     let mut pairs = found.iter().zip(expected).enumerate();
-    pairs.find(|(_, (found, expected))| found != expected).map(|(i, (&found, &expected))| (i, found, expected))
+    pairs
+        .find(|(_, (found, expected))| found != expected)
+        .map(|(i, (&found, &expected))| (i, found, expected))
 }
 
 fn assert_scans(device: &mut Device, numbers: Vec<u32>) {
     let count = numbers.len() as u32;
     let blocks = count.div_ceil(SCAN_BLOCK);
     device.upload(BufferId::Keys, &numbers).expect("an upload");
-    device.create(BufferId::ScanSums, u64::from(blocks) * 4).expect("a buffer");
+    device
+        .create(BufferId::ScanSums, u64::from(blocks) * 4)
+        .expect("a buffer");
     device.create(BufferId::ScanTotal, 4).expect("a buffer");
     let mut recording = Recording::new();
     gather::scan(BufferId::Keys, count, &mut recording);
@@ -34,9 +38,14 @@ fn assert_scans(device: &mut Device, numbers: Vec<u32>) {
 
     let mut expected = numbers;
     let total = cpu::scan(&mut expected);
-    let found: Vec<u32> = device.download(BufferId::Keys, Some(expected.len())).expect("a download");
+    let found: Vec<u32> = device
+        .download(BufferId::Keys, Some(expected.len()))
+        .expect("a download");
     let difference = first_difference(&found, &expected);
-    assert_eq!(difference, None, "scan of {count}: (index, found, expected) of the first difference");
+    assert_eq!(
+        difference, None,
+        "scan of {count}: (index, found, expected) of the first difference"
+    );
     let found: Vec<u32> = device.download(BufferId::ScanTotal, Some(1)).expect("a download");
     assert_eq!(found, [total], "total of {count} numbers");
 }
@@ -46,7 +55,10 @@ fn a_scan_is_exact_for_one_number_around_a_block_and_for_millions() {
     let mut device = device();
     for count in [1, 2, 127, 2047, 2048, 2049, 100_000, 5_000_001] {
         // Below 2⁹, so that the sums stay below 2³².
-        assert_scans(&mut device, random_words(count, 1).iter().map(|word| word >> 23).collect());
+        assert_scans(
+            &mut device,
+            random_words(count, 1).iter().map(|word| word >> 23).collect(),
+        );
     }
 }
 
@@ -67,7 +79,9 @@ fn assert_sorts(device: &mut Device, case: &str, keys: Vec<u32>, capacity: usize
     };
     device.upload(BufferId::Keys, &padded(&keys)).expect("an upload");
     device.upload(BufferId::Values, &padded(&values)).expect("an upload");
-    device.upload(BufferId::PhotonCount, &[count as u32]).expect("an upload");
+    device
+        .upload(BufferId::PhotonCount, &[count as u32])
+        .expect("an upload");
     let histograms = (capacity as u32).div_ceil(SORT_TILE) << SORT_DIGIT_BITS;
     for (id, words) in [
         (BufferId::OtherKeys, capacity as u32),
@@ -87,7 +101,10 @@ fn assert_sorts(device: &mut Device, case: &str, keys: Vec<u32>, capacity: usize
     for (id, expected) in [(BufferId::Keys, expected_keys), (BufferId::Values, expected_values)] {
         let found: Vec<u32> = device.download(id, Some(capacity)).expect("a download");
         let difference = first_difference(&found[..count], &expected);
-        assert_eq!(difference, None, "{case}, {bits} bits: (index, found, expected) of the first difference in {id:?}");
+        assert_eq!(
+            difference, None,
+            "{case}, {bits} bits: (index, found, expected) of the first difference in {id:?}"
+        );
     }
 }
 

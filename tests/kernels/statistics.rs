@@ -1,5 +1,6 @@
 //! The stages `reset`, `update` and `resolve`.
 
+use ppm_vk::backend::Backend;
 use ppm_vk::config::{Estimator, RenderConfig};
 use ppm_vk::cpu::{self, Counts};
 use ppm_vk::gather::METHODS;
@@ -36,7 +37,13 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     const ITERATIONS: u32 = 10_000;
     let mut bench = Bench::new("cornell", tiny());
     // Slot i lies on object i; so many photons arrive there in each iteration.
-    let arriving = |slot: u32| if slot == 63 { 0 } else { [0, 1, 2, 3, 7, 30][slot as usize % 6] };
+    let arriving = |slot: u32| {
+        if slot == 63 {
+            0
+        } else {
+            [0, 1, 2, 3, 7, 30][slot as usize % 6]
+        }
+    };
     let mut points: Vec<VisiblePoint> = (0..64).map(|slot| visible_point([0.0; 3], slot)).collect();
     points[63].position_object[3] = f32::from_bits(NO_OBJECT);
     let mut photons: Vec<Photon> = Vec::new();
@@ -62,7 +69,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
         recording.dispatch(StageDesc::new(&shaders::UPDATE, 64));
     }
     for _ in 0..ITERATIONS / 500 {
-        bench.renderer.device().run(&recording).expect("a run");
+        bench.renderer.gpu().run(&recording).expect("a run");
     }
     let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
 
@@ -71,20 +78,36 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     let mut gathered = vec![Gathered { flux_count: [0.0; 4] }; 64];
     for _ in 0..ITERATIONS {
         cpu::gather_naive(&points, &before, &photons, &mut gathered);
-        cpu::update(&points, bench.config.alpha, &Counts::default(), &mut gathered, &mut expected);
+        cpu::update(
+            &points,
+            bench.config.alpha,
+            &Counts::default(),
+            &mut gathered,
+            &mut expected,
+        );
     }
     for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
         let m = arriving(slot as u32);
         if m == 0 {
             assert_eq!(found, &before[slot], "slot {slot} without photons has changed");
         }
-        assert_eq!(accepted(found), accepted(&before[slot]) + u64::from(m * ITERATIONS), "slot {slot}: accepted");
+        assert_eq!(
+            accepted(found),
+            accepted(&before[slot]) + u64::from(m * ITERATIONS),
+            "slot {slot}: accepted"
+        );
         let difference = relative_difference(radius2(found), radius2(expected));
-        assert!(difference < TOLERANCE, "slot {slot}, M = {m}: R² off by {difference:e}: {found:?}, {expected:?}");
+        assert!(
+            difference < TOLERANCE,
+            "slot {slot}, M = {m}: R² off by {difference:e}: {found:?}, {expected:?}"
+        );
         let tau = |s: &Statistics| (xyz(s.flux_high) + xyz(s.flux_low)).to_array();
         for (found, expected) in tau(found).into_iter().zip(tau(expected)) {
             let difference = relative_difference(found, expected);
-            assert!(difference < TOLERANCE, "slot {slot}, M = {m}: τ {found}, {expected} expected");
+            assert!(
+                difference < TOLERANCE,
+                "slot {slot}, M = {m}: τ {found}, {expected} expected"
+            );
         }
     }
     // The product of eq. 2 over the iterations, where nothing came before: N = α·i·M.
@@ -92,7 +115,52 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     let ratio = |i: u32| (alpha * f64::from(i) + alpha) / (alpha * f64::from(i) + 1.0);
     let by_hand = 0.01 * (0..ITERATIONS).map(ratio).product::<f64>();
     let difference = relative_difference(radius2(&found[1]), by_hand);
-    assert!(difference < TOLERANCE, "R² {} after one photon a time, {by_hand} by hand", radius2(&found[1]));
+    assert!(
+        difference < TOLERANCE,
+        "R² {} after one photon a time, {by_hand} by hand",
+        radius2(&found[1])
+    );
+}
+
+#[test]
+fn radii_shrink_where_more_photons_than_wanted_were_found() {
+    let mut bench = Bench::new("cornell", tiny());
+    let wanted = 7.5f32;
+    let gathered: Vec<Gathered> = (0..64)
+        .map(|slot| Gathered {
+            flux_count: [1.0, 2.0, 3.0, f32::from_bits(slot * slot)],
+        })
+        .collect();
+    let statistics: Vec<Statistics> = random_numbers(64).map(|[u, ..]| cpu::reset(0.01 + u)).collect();
+    bench.upload(BufferId::VisiblePoints, &[visible_point([0.0; 3], 0); 64]);
+    bench.upload(BufferId::GatheredOf, &gathered);
+    bench.upload(BufferId::StatisticsOf, &statistics);
+    let mut recording = Recording::new();
+    recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, 64).push(wanted));
+    bench.renderer.gpu().run(&recording).expect("a run");
+
+    let mut expected = statistics.clone();
+    cpu::fit_radius(wanted, &mut gathered.clone(), &mut expected);
+    let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+    for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        let difference = relative_difference(radius2(found), radius2(expected));
+        assert!(
+            difference < TOLERANCE,
+            "slot {slot}: R² {}, {} on the CPU",
+            radius2(found),
+            radius2(expected)
+        );
+        let by_hand = f64::from(statistics[slot].radius2_high) * (7.5 / (slot * slot) as f64).min(1.0);
+        let difference = relative_difference(radius2(found), by_hand);
+        assert!(
+            difference < TOLERANCE,
+            "slot {slot}: R² {}, {by_hand} by hand",
+            radius2(found)
+        );
+    }
+    for (slot, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
+        assert_eq!(gathered.flux_count, [0.0; 4], "slot {slot}");
+    }
 }
 
 #[test]
@@ -104,9 +172,18 @@ fn updates_sum_up_the_radii_and_clear_what_was_gathered() {
     let expected = cpu::radius_sums(&points, &statistics, shaders::UPDATE.workgroup as usize);
     assert_eq!(found.len(), expected.len());
     for (group, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        assert_eq!((found.count, found.radius2), (expected.count, expected.radius2), "group {group}");
+        assert_eq!(
+            (found.count, found.radius2),
+            (expected.count, expected.radius2),
+            "group {group}"
+        );
         let difference = relative_difference(found.radius.into(), expected.radius.into());
-        assert!(difference < 1e-6, "group {group}: ΣR {} on the device, {} on the CPU", found.radius, expected.radius);
+        assert!(
+            difference < 1e-6,
+            "group {group}: ΣR {} on the device, {} on the CPU",
+            found.radius,
+            expected.radius
+        );
     }
     for (slot, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
         assert_eq!(gathered.flux_count, [0.0; 4], "slot {slot}");

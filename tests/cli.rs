@@ -1,0 +1,334 @@
+//! What scripts rely on: exit codes, one line for an error, files that are whole or absent.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+fn scene(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
+}
+
+fn ppm_vk(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_ppm-vk"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("ppm-vk starts")
+}
+
+fn small_render(folder: &Path, scene: &Path, more: &[&str]) -> Output {
+    let scene = scene.to_str().expect("UTF-8");
+    let mut arguments = vec![
+        "--scene",
+        scene,
+        "--resolution",
+        "16x16",
+        "--iterations",
+        "1",
+        "--photons",
+        "1000",
+    ];
+    arguments.extend(more);
+    ppm_vk(folder, &arguments)
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("folder");
+    entries
+        .map(|entry| entry.expect("entry").file_name().to_string_lossy().into_owned())
+        .collect()
+}
+
+/// The work failed: exit code 1, one line that has these words, no panic, no file.
+fn assert_fails(folder: &TempDir, output: &Output, words: &[&str]) {
+    let text = stderr(output);
+    let errors: Vec<&str> = text.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert_eq!(output.status.code(), Some(1), "exit code; stderr: {text}");
+    assert_eq!(errors.len(), 1, "one error line expected: {text}");
+    assert!(!text.contains("panicked"), "{text}");
+    for word in words {
+        assert!(errors[0].contains(word), "«{word}» isn't in: {}", errors[0]);
+    }
+    let left: Vec<_> = files(folder.path())
+        .into_iter()
+        .filter(|file| file.ends_with(".exr"))
+        .collect();
+    assert!(left.is_empty(), "left behind: {left:?}");
+}
+
+/// The arguments are wrong: exit code 2, and the flag is named.
+fn assert_refused(output: &Output, flag: &str) {
+    let text = stderr(output);
+    assert_eq!(output.status.code(), Some(2), "exit code for {flag}; stderr: {text}");
+    assert!(text.contains(flag), "{flag} isn't named: {text}");
+    assert!(!text.contains("panicked"), "{text}");
+}
+
+#[test]
+fn a_render_writes_the_picture_under_the_scenes_name() {
+    let folder = TempDir::new().expect("folder");
+    let output = small_render(folder.path(), &scene("cornell.gltf"), &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(files(folder.path()), ["cornell.exr"]);
+    assert!(
+        stderr(&output).contains("initial radius"),
+        "the automatic radius is printed: {}",
+        stderr(&output)
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
+    let folder = TempDir::new().expect("folder");
+    let mut pictures = Vec::new();
+    for (file, seed) in [("a.exr", "7"), ("b.exr", "7"), ("c.exr", "8")] {
+        let arguments = ["-o", file, "--seed", seed, "--iterations", "3"];
+        let scene = scene("cornell-spheres.gltf");
+        let mut all = vec![
+            "--scene",
+            scene.to_str().expect("UTF-8"),
+            "--resolution",
+            "48x32",
+            "--photons",
+            "5000",
+        ];
+        all.extend(arguments);
+        let output = ppm_vk(folder.path(), &all);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        pictures.push(ppm_vk::film::read_exr(&folder.path().join(file)).expect("picture"));
+    }
+    assert!(
+        pictures[0] == pictures[1],
+        "two runs with one seed differ: an order that isn't fixed somewhere"
+    );
+    assert!(pictures[0] != pictures[2], "the seed has no effect");
+}
+
+#[test]
+fn profiles_and_traces_list_every_stage() {
+    let folder = TempDir::new().expect("folder");
+    let more = [
+        "--profile",
+        "--profile-json",
+        "p.json",
+        "--trace",
+        "t.json",
+        "--png",
+        "p.png",
+        "--quiet",
+    ];
+    let output = small_render(folder.path(), &scene("cornell.gltf"), &more);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let table = String::from_utf8_lossy(&output.stdout).into_owned();
+    let read = |file: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(folder.path().join(file)).expect(file)).expect("JSON")
+    };
+    let profile = read("p.json");
+    let events = read("t.json")["traceEvents"].as_array().expect("events").len();
+    let stages = profile["stages"].as_array().expect("stages");
+    for stage in ["camera", "photons", "gather_grid", "direct", "update"] {
+        assert!(table.contains(stage), "{stage} isn't in the table:\n{table}");
+        assert!(
+            stages.iter().any(|entry| entry["stage"] == stage),
+            "{stage} isn't in the JSON: {profile}"
+        );
+    }
+    let launches: u64 = stages
+        .iter()
+        .map(|stage| stage["launches"].as_u64().expect("launches"))
+        .sum();
+    assert_eq!(launches, events as u64, "every launch is an event of the trace");
+    assert!(
+        table.contains("timestamps of"),
+        "the timestamp period is in the table:\n{table}"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_writes_the_picture_and_exits_with_130() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell.gltf");
+    let arguments = [
+        "--resolution",
+        "32x32",
+        "--iterations",
+        "1000000",
+        "--photons",
+        "1000",
+        "-o",
+        "o.exr",
+    ];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_ppm-vk"))
+        .args(["--scene", scene.to_str().expect("UTF-8")])
+        .args(arguments)
+        .current_dir(folder.path())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("ppm-vk starts");
+    // The radius is printed when the iterations begin.
+    let mut stderr = std::io::BufReader::new(child.stderr.take().expect("stderr"));
+    std::io::BufRead::read_line(&mut stderr, &mut String::new()).expect("a line");
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let kill = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("kill");
+    assert!(kill.success());
+    let status = child.wait().expect("exit");
+    assert_eq!(status.code(), Some(130));
+    assert_eq!(files(folder.path()), ["o.exr"]);
+    ppm_vk::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
+}
+
+#[test]
+fn bad_scene_files_give_one_line_and_no_picture() {
+    let folder = TempDir::new().expect("folder");
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("file");
+        path
+    };
+    let missing = folder.path().join("missing.gltf");
+    assert_fails(&folder, &small_render(folder.path(), &missing, &[]), &["missing.gltf"]);
+    let truncated = write("truncated.glb", b"glTF\x02\x00\x00\x00\xff\xff\x00\x00");
+    assert_fails(
+        &folder,
+        &small_render(folder.path(), &truncated, &[]),
+        &["truncated.glb"],
+    );
+    let cyclic = write(
+        "cyclic.gltf",
+        br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"children":[1]},{"children":[0]}]}"#,
+    );
+    assert_fails(
+        &folder,
+        &small_render(folder.path(), &cyclic, &[]),
+        &["cyclic.gltf", "node"],
+    );
+    let extension = write(
+        "extension.gltf",
+        br#"{"asset":{"version":"2.0"},"extensionsUsed":["XYZ_new"],"extensionsRequired":["XYZ_new"]}"#,
+    );
+    assert_fails(&folder, &small_render(folder.path(), &extension, &[]), &["XYZ_new"]);
+    let empty = write(
+        "empty.gltf",
+        br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[]}]}"#,
+    );
+    assert_fails(&folder, &small_render(folder.path(), &empty, &[]), &["triangle"]);
+}
+
+#[test]
+fn arguments_out_of_range_are_refused() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell.gltf");
+    for (flag, value) in [
+        ("--resolution", "0x10"),
+        ("--resolution", "10"),
+        ("--resolution", "100000x10"),
+        ("--alpha", "0"),
+        ("--alpha", "1"),
+        ("--alpha", "nan"),
+        ("--radius", "0"),
+        ("--radius", "-1"),
+        ("--radius", "inf"),
+        ("--photons", "0"),
+        ("--iterations", "0"),
+        ("--max-depth", "0"),
+        ("--time", "0"),
+        ("--gather", "magic"),
+        ("--estimator", "magic"),
+        ("--seed", "-1"),
+    ] {
+        let argument = format!("{flag}={value}");
+        assert_refused(
+            &ppm_vk(folder.path(), &["--scene", scene.to_str().expect("UTF-8"), &argument]),
+            flag,
+        );
+    }
+    assert_refused(&ppm_vk(folder.path(), &["--quiet"]), "--scene");
+    assert!(files(folder.path()).is_empty());
+}
+
+#[test]
+fn an_unwritable_output_fails_before_any_work() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell.gltf");
+    let output = small_render(folder.path(), &scene, &["-o", "no-such-folder/o.exr"]);
+    assert_fails(&folder, &output, &["no-such-folder"]);
+    let output = small_render(folder.path(), &scene, &["--png", "no-such-folder/o.png"]);
+    assert_fails(&folder, &output, &["no-such-folder"]);
+}
+
+#[test]
+fn unknown_cameras_and_devices_are_named_with_what_there_is() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell.gltf");
+    assert_fails(
+        &folder,
+        &small_render(folder.path(), &scene, &["--camera", "nobody"]),
+        &["nobody", "camera"],
+    );
+    assert_fails(
+        &folder,
+        &small_render(folder.path(), &scene, &["--device", "nothing"]),
+        &["nothing", "device"],
+    );
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_machine_without_vulkan_is_told_what_to_install() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell.gltf");
+    let arguments = ["--scene", scene.to_str().expect("UTF-8"), "--resolution", "16x16"];
+    // A loader that is no library, found before the real one.
+    let libraries = TempDir::new().expect("folder");
+    std::fs::write(libraries.path().join("libvulkan.so.1"), b"").expect("file");
+    std::fs::write(libraries.path().join("libvulkan.so"), b"").expect("file");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ppm-vk"));
+    command.args(arguments).current_dir(folder.path());
+    let no_loader = command
+        .env("LD_LIBRARY_PATH", libraries.path())
+        .output()
+        .expect("ppm-vk starts");
+    assert_fails(&folder, &no_loader, &["loader", "--backend cpu"]);
+
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ppm-vk"));
+    command.args(arguments).current_dir(folder.path());
+    let nowhere = libraries.path().join("no-driver.json");
+    let no_driver = command
+        .env("VK_DRIVER_FILES", &nowhere)
+        .env("VK_ICD_FILENAMES", &nowhere)
+        .output()
+        .expect("ppm-vk starts");
+    assert_fails(&folder, &no_driver, &["driver", "--backend cpu"]);
+}
+
+#[test]
+fn lists_go_to_stdout() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell-spheres.gltf");
+    for (arguments, words) in [
+        (vec!["gathers"], vec!["naive", "grid"]),
+        (vec!["devices"], vec!["driver", "storage buffer"]),
+        (
+            vec!["inspect", scene.to_str().expect("UTF-8")],
+            vec!["triangles", "1 mirror", "1 dielectric", "camera 0"],
+        ),
+        (vec!["--help"], vec!["--scene", "--profile-json"]),
+        (vec!["--version"], vec!["ppm-vk"]),
+    ] {
+        let output = ppm_vk(folder.path(), &arguments);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+        for word in words {
+            assert!(text.contains(word), "{arguments:?} doesn't say «{word}»: {text}");
+        }
+    }
+}

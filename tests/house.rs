@@ -1,0 +1,141 @@
+//! The rules of the house that a machine can check: who may import what, and where Vulkan and `unsafe` live.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("folder") {
+        let path = entry.expect("entry").path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// Every source file under src, by its path there, and its code without comments.
+fn code() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = Vec::new();
+    sources(&root, &mut found);
+    assert!(found.len() > 20, "only {} source files found", found.len());
+    found
+        .iter()
+        .map(|path| {
+            let text = fs::read_to_string(path).expect("source");
+            let lines: Vec<&str> = text
+                .lines()
+                .filter(|line| !line.trim_start().starts_with("//"))
+                .collect();
+            (
+                path.strip_prefix(&root).expect("under src").display().to_string(),
+                lines.join("\n"),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn vulkan_and_unsafe_live_in_gpu_alone() {
+    for (file, text) in code() {
+        if !file.starts_with("gpu") {
+            for word in ["ash::", "use ash", "unsafe ", "gpu_allocator"] {
+                assert!(!text.contains(word), "src/{file} has «{word}»");
+            }
+        }
+    }
+}
+
+#[test]
+fn imports_go_downward() {
+    // Who must not know whom.
+    let forbidden: &[(&str, &[&str])] = &[
+        ("layout.rs", &["crate::"]),
+        (
+            "stage.rs",
+            &[
+                "crate::scene",
+                "crate::gpu",
+                "crate::record",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+            ],
+        ),
+        (
+            "record.rs",
+            &[
+                "crate::scene",
+                "crate::gpu",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+            ],
+        ),
+        (
+            "gather.rs",
+            &[
+                "crate::scene",
+                "crate::gpu",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+            ],
+        ),
+        (
+            "gpu",
+            &[
+                "crate::scene",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+                "crate::gather",
+            ],
+        ),
+        ("cpu", &["crate::gpu", "crate::pipeline", "crate::cli"]),
+        (
+            "scene",
+            &[
+                "crate::gpu",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+                "crate::record",
+            ],
+        ),
+        ("pipeline.rs", &["crate::cli", "crate::cpu"]),
+    ];
+    for (file, text) in code() {
+        for (layer, words) in forbidden {
+            if file.starts_with(layer) {
+                for word in *words {
+                    assert!(!text.contains(word), "src/{file} imports {word}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_stage_is_documented_where_it_is_written() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl/stages");
+    for entry in fs::read_dir(folder).expect("folder") {
+        let path = entry.expect("entry").path();
+        let text = fs::read_to_string(&path).expect("stage");
+        let comment = text.lines().find(|line| !line.starts_with('#')).unwrap_or("");
+        assert!(
+            comment.starts_with("// "),
+            "{} doesn't say first what it does",
+            path.display()
+        );
+        // Before it gl_WorkGroupSize is (1, 1, 1), and shared arrays that are sized by it are too small.
+        let size = text.find("layout(local_size_x").expect("a workgroup size");
+        let include = text.find("#include").unwrap_or(text.len());
+        assert!(
+            size < include,
+            "{} includes files before it says its workgroup's size",
+            path.display()
+        );
+    }
+}
