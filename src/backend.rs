@@ -85,6 +85,10 @@ impl Counters {
     }
 }
 
+/// Radii, in render units, between which R² and the flux over it stay far from f32's limits.
+const SMALLEST_RADIUS: f64 = 1e-12;
+const LARGEST_RADIUS: f64 = 1e6;
+
 /// What the stages read of the configuration, the scene and the camera; the buffers' sizes are left at 0. The initial R²
 /// is 0 where it has to be found.
 pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loop_limit: u32) -> Settings {
@@ -109,10 +113,10 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         photon_capacity: 0,
         cell_bits: 0,
         alpha: config.alpha,
-        initial_radius2: config
-            .radius
-            .map_or(0.0, |radius| (radius * scene.scale).powi(2) as f32),
+        initial_radius2: config.radius.map_or(0.0, |radius| {
+            (radius * scene.scale).clamp(SMALLEST_RADIUS, LARGEST_RADIUS).powi(2) as f32
+        }),
         loop_limit,
-        scan_padding: 0,
+        bsdf_sampling: scene.bsdf_sampling,
     }
 }

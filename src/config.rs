@@ -1,6 +1,7 @@
 //! What the user asked for, and every buffer size and group count that follows from it.
 
 use crate::error::{Error, Result};
+use crate::layout::{Photon, VisiblePoint};
 
 /// Which visible points an iteration uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -111,7 +112,7 @@ impl RenderConfig {
 
 /// Pixels of a tile's side: visible points lie in memory tile by tile.
 pub const TILE: u32 = 8;
-/// Visible points of a pixel where they are found once: glass splits the path while a slot is free.
+/// Visible points of a pixel at the most, where they are found once: glass splits the path while a slot is free.
 pub const PPM_SLOTS: u32 = 8;
 /// Photons that one dispatch of the naive gather tests at the most, below every known driver's loop limit.
 pub const NAIVE_RANGE: u32 = 16_000;
@@ -141,15 +142,17 @@ pub struct Sizes {
     pub gather_parts: u32,
 }
 
-/// What of a device the sizes depend on.
+/// What of a device and a scene the sizes depend on.
 #[derive(Debug, Clone, Copy)]
-pub struct DeviceLimits {
+pub struct Limits {
     /// Bytes that one storage buffer binding can span.
     pub storage_buffer_bytes: u64,
     /// Loop iterations that an invocation is given.
     pub loop_limit: u32,
     /// Invocations that keep the device busy.
     pub lanes: u32,
+    /// Whether the scene has surfaces at which a path splits in two.
+    pub glass: bool,
 }
 
 /// Photons that a path leaves behind on average; more are noticed and make the buffers grow.
@@ -157,19 +160,21 @@ const EXPECTED_PHOTONS: f64 = 5.0;
 
 impl Sizes {
     /// The sizes for a render.
-    pub fn new(config: &RenderConfig, limits: DeviceLimits) -> Self {
+    pub fn new(config: &RenderConfig, limits: Limits) -> Self {
         let [width, height] = config.resolution;
+        let pixel_slots = width.div_ceil(TILE) * height.div_ceil(TILE) * TILE * TILE;
+        let fitting = limits.storage_buffer_bytes / size_of::<VisiblePoint>() as u64 / u64::from(pixel_slots);
         let slots_per_pixel = match config.estimator {
-            Estimator::Sppm => 1,
-            Estimator::Ppm => PPM_SLOTS,
+            Estimator::Ppm if limits.glass => PPM_SLOTS.min(fitting.max(1) as u32),
+            _ => 1,
         };
-        let photons_at_most = (limits.storage_buffer_bytes / size_of::<crate::layout::Photon>() as u64) as u32;
+        let photons_at_most = (limits.storage_buffer_bytes / size_of::<Photon>() as u64) as u32;
         let batch_paths = config
             .photons
             .min((f64::from(photons_at_most) / (2.0 * EXPECTED_PHOTONS)) as u32)
             .max(1);
         let mut sizes = Self {
-            pixel_slots: width.div_ceil(TILE) * height.div_ceil(TILE) * TILE * TILE,
+            pixel_slots,
             slots_per_pixel,
             batch_paths,
             photon_lanes: 0,
@@ -187,6 +192,18 @@ impl Sizes {
         let paths = f64::from(self.paths_per_lane());
         // Mean and a few standard deviations of a sum of geometrically distributed lengths.
         self.lane_capacity = (EXPECTED_PHOTONS * (paths + 3.0 * paths.sqrt())).ceil() as u32;
+    }
+
+    /// Takes fewer photon paths at once until the photons of a batch fit into one buffer.
+    pub fn shrink_batch(&mut self, limits: &Limits) {
+        let bytes = |sizes: &Self| u64::from(sizes.photon_capacity()) * size_of::<Photon>() as u64;
+        while bytes(self) > limits.storage_buffer_bytes && self.batch_paths > 1 {
+            let paths = self.paths_per_lane();
+            let capacity = self.lane_capacity;
+            self.batch_paths = self.batch_paths.div_ceil(2);
+            self.photon_lanes = self.batch_paths.div_ceil(paths);
+            self.lane_capacity = capacity;
+        }
     }
 
     /// Photon paths that an invocation follows one after the other, at the most.

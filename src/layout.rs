@@ -5,6 +5,9 @@ use bytemuck::{Pod, Zeroable};
 /// Object of a visible point whose path met no matte surface.
 pub const NO_OBJECT: u32 = u32::MAX;
 
+/// Light of a triangle that doesn't emit.
+pub const NO_LIGHT: u32 = u32::MAX;
+
 /// Bit of [`StatusCounters::again`]: a lane's photons didn't fit.
 pub const PHOTONS_DID_NOT_FIT: u32 = 1;
 /// Bit of [`StatusCounters::again`]: a lane's paths need more loop iterations than the driver gives.
@@ -77,8 +80,8 @@ device_structs! {
         pub initial_radius2: f32,
         /// Iterations that all loops of one invocation may make together.
         pub loop_limit: u32,
-        /// Zero.
-        pub scan_padding: u32,
+        /// Probability that direct light is sampled by a direction of the BSDF instead of a light's point.
+        pub bsdf_sampling: f32,
     }
 
     /// An inner node of the BVH with the boxes of both children.
@@ -117,8 +120,8 @@ device_structs! {
         pub material: u32,
         /// 1 where the shading normals differ from the geometric one.
         pub smooth_shaded: u32,
-        /// Zero.
-        pub padding: u32,
+        /// Index of its light, or [`NO_LIGHT`].
+        pub light: u32,
     }
 
     /// A material.
@@ -238,9 +241,7 @@ device_structs! {
     }
 
     /// What the stages report to the host.
-    pub struct StatusCounters: 32 {
-        /// Photons that wanted to be stored, of the batch with the most.
-        pub photons_in_batch: u32,
+    pub struct StatusCounters: 28 {
         /// Most photons that one lane had to store.
         pub lane_need: u32,
         /// Paths ended by the bounce limit.

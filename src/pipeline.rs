@@ -1,7 +1,7 @@
 //! The order of the stages in one iteration, on a Vulkan device. [`Stages::iteration`] reads like figure 1 of the paper.
 
 use crate::backend::{Backend, Counters, DeviceDescription, settings};
-use crate::config::{Accel, DeviceLimits, Direct, Estimator, RenderConfig, Sizes};
+use crate::config::{Accel, Direct, Estimator, Limits, RenderConfig, Sizes};
 use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::gather::{METHODS, scan};
@@ -70,16 +70,12 @@ pub struct Renderer {
     device: Device,
     config: RenderConfig,
     sizes: Sizes,
+    limits: Limits,
     settings: Settings,
     iterations: u32,
     emitted: u64,
     counters: Counters,
 }
-
-/// The iteration whose photons the radius is found from; no render gets that far.
-const PILOT: u32 = u32::MAX;
-/// Rounds of shrinking the radius where photons are denser than wanted.
-const FITS: u32 = 2;
 
 /// Loop iterations that photon paths of a lane may make together where the driver has a limit: a subgroup's lanes share
 /// it on the driver that has one, and an inner loop runs as long as its slowest lane.
@@ -94,10 +90,11 @@ impl Renderer {
     /// A setting outside its range, a device without enough memory, or a failed Vulkan call.
     pub fn new(mut device: Device, scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
         config.check()?;
-        let limits = DeviceLimits {
+        let limits = Limits {
             storage_buffer_bytes: device.summary().max_storage_buffer_bytes,
             loop_limit: loop_budget(device.loop_limit()),
             lanes: if device.summary().kind == "cpu" { 4096 } else { 1 << 18 },
+            glass: scene.has_glass(),
         };
         let sizes = Sizes::new(&config, limits);
         device.upload(BufferId::Bvh, &scene.bvh)?;
@@ -110,6 +107,7 @@ impl Renderer {
             device,
             config,
             sizes,
+            limits,
             settings,
             iterations: 0,
             emitted: 0,
@@ -149,15 +147,16 @@ impl Renderer {
     /// After an iteration that has to be done again: sizes that it needs, and what it gathered forgotten.
     fn make_room(&mut self, status: &StatusCounters) -> Result<()> {
         self.counters.repeated_iterations += 1;
+        // Dealt anew, the lanes' photons are estimated anew.
         if status.again & LANES_TOO_LONG != 0 {
             self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
-        }
-        if status.again & PHOTONS_DID_NOT_FIT != 0 {
+        } else if status.again & PHOTONS_DID_NOT_FIT != 0 {
             self.sizes.lane_capacity = self
                 .sizes
                 .lane_capacity
                 .max(status.lane_need + status.lane_need / 4 + 1);
         }
+        self.sizes.shrink_batch(&self.limits);
         if status.again & GATHERS_TOO_LONG != 0 {
             self.sizes.gather_parts *= 2;
         }
@@ -248,11 +247,18 @@ impl Renderer {
         if self.config.radius.is_some() {
             return self.reset();
         }
-        let mut recording = Recording::new();
-        recording.fill(BufferId::Status, 0);
-        self.stages().camera(0, &mut recording);
-        self.stages().photons(PILOT, 0, &mut recording);
-        self.device.run(&recording)?;
+        loop {
+            let mut recording = Recording::new();
+            recording.fill(BufferId::Status, 0);
+            self.stages().camera(0, &mut recording);
+            self.stages().photons(radius::PILOT, 0, &mut recording);
+            self.device.run(&recording)?;
+            let status = self.take_status()?;
+            if status.again == 0 {
+                break;
+            }
+            self.make_room(&status)?;
+        }
         let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
         let count: Vec<u32> = self.device.download(BufferId::PhotonCount, Some(1))?;
         let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
@@ -262,7 +268,7 @@ impl Renderer {
         self.settings.initial_radius2 = radius * radius * share;
         self.device.upload(BufferId::Settings, &[self.settings])?;
         self.reset()?;
-        for _ in 0..FITS {
+        for _ in 0..radius::FITS {
             let mut recording = Recording::new();
             (METHODS[self.config.gather].record)(&self.sizes, &mut recording);
             recording.dispatch(

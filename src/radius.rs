@@ -8,6 +8,10 @@ use crate::layout::{NO_OBJECT, Photon, VisiblePoint};
 
 /// Photons that a visible point should accept in the first iteration, at the most.
 pub const PHOTONS_WANTED: usize = 15;
+/// The iteration whose photons the radius is found from; no render gets that far.
+pub const PILOT: u32 = u32::MAX;
+/// Rounds of shrinking the radius where photons are denser than wanted.
+pub const FITS: u32 = 2;
 /// Visible points that are asked.
 const PROBES: usize = 2048;
 /// What is used where no visible point sees a photon, render units (the scene is 2 long).

@@ -1,7 +1,7 @@
 //! Barriers of recorded commands, checked without a device by an argument of their own: between two commands that touch
 //! the same buffer, one of them writing, there is a barrier.
 
-use ppm_vk::config::{DeviceLimits, RenderConfig, Sizes};
+use ppm_vk::config::{Limits, RenderConfig, Sizes};
 use ppm_vk::gather::METHODS;
 use ppm_vk::pipeline::Stages;
 use ppm_vk::record::{Command, Recording};
@@ -39,10 +39,11 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
             photons,
             ..RenderConfig::default()
         };
-        let limits = DeviceLimits {
+        let limits = Limits {
             storage_buffer_bytes,
             loop_limit: u32::MAX,
             lanes: 4096,
+            glass: true,
         };
         let sizes = Sizes::new(&config, limits);
         let stages = Stages {

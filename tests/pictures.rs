@@ -43,6 +43,9 @@ fn render(name: &str, iterations: u32, config: RenderConfig) -> Image {
     image
 }
 
+/// Le / (1 − ρ) of `furnace-closed`.
+const FURNACE: [f64; 3] = [1.0 / 0.8, 1.0 / 0.5, 1.0 / 0.2];
+
 fn small(side: u32, photons: u32) -> RenderConfig {
     RenderConfig {
         resolution: [side, side],
@@ -94,7 +97,8 @@ fn assert_matches_reference(name: &str, direct: Direct, iterations: u32, mean_to
     }
 }
 
-/// Standard deviation of the picture's mean over seeds: 0.05 %.
+/// Standard deviation of the picture's mean over seeds: 0.06 % in the last channel; what photons lose at the edges of the
+/// walls is 0.1 % of it.
 #[test]
 fn a_closed_furnace_shines_with_le_over_one_minus_rho() {
     let image = render(
@@ -102,15 +106,10 @@ fn a_closed_furnace_shines_with_le_over_one_minus_rho() {
         96,
         RenderConfig {
             radius: Some(0.01),
-            ..small(64, 50_000)
+            ..small(96, 100_000)
         },
     );
-    assert_means(
-        &image,
-        [1.0 / 0.8, 0.5 / 0.5, 0.25 / 0.2],
-        0.003,
-        "light by shadow rays and photons",
-    );
+    assert_means(&image, FURNACE, 0.003, "light by shadow rays and photons");
 }
 
 /// Standard deviation of the picture's mean over seeds: 0.1 %. Photons alone lose what lies beyond an object's edge
@@ -120,10 +119,10 @@ fn a_closed_furnace_lit_by_photons_alone_shines_alike() {
     let config = RenderConfig {
         radius: Some(0.01),
         direct: Direct::Photons,
-        ..small(64, 50_000)
+        ..small(96, 100_000)
     };
-    let image = render("furnace-closed", 96, config);
-    assert_means(&image, [1.0 / 0.8, 0.5 / 0.5, 0.25 / 0.2], 0.006, "light by photons");
+    let image = render("furnace-closed", 48, config);
+    assert_means(&image, FURNACE, 0.006, "light by photons");
 }
 
 #[test]
@@ -169,19 +168,27 @@ fn photons_and_shadow_rays_give_the_same_direct_light() {
     assert_means(&photons, mean(&lights), 0.012, "photons against shadow rays");
 }
 
-/// Standard deviation of the ratio of means over seeds: 0.2 %; pixel centres instead of areas add to it.
+/// Standard deviation of the ratio of means over seeds: 0.2 %. Only where neither picture sees the lamp, directly or by
+/// a mirror: whether a pixel's centre lies in it makes more difference than anything else.
 #[test]
 fn both_estimators_agree() {
-    let sppm = render("cornell-spheres", 24, small(64, 50_000));
+    let sppm = render("cornell-spheres", 24, small(63, 50_000));
     let ppm = render(
         "cornell-spheres",
         24,
         RenderConfig {
             estimator: Estimator::Ppm,
-            ..small(64, 50_000)
+            ..small(63, 50_000)
         },
     );
-    assert_means(&ppm, mean(&sppm), 0.015, "ppm against sppm");
+    let pairs = sppm.pixels().iter().zip(ppm.pixels());
+    let (a, b): (Vec<_>, Vec<_>) = pairs
+        .filter(|(a, b)| a.iter().chain(b.iter()).all(|value| *value < 1.0))
+        .map(|(a, b)| (*a, *b))
+        .unzip();
+    assert!(a.len() > 3500, "only {} pixels are darker than the lamp", a.len());
+    let picture = |pixels: Vec<[f32; 3]>| Image::new(pixels.len(), 1, pixels);
+    assert_means(&picture(b), mean(&picture(a)), 0.015, "ppm against sppm");
 }
 
 #[test]
@@ -268,7 +275,7 @@ fn a_scene_moved_far_away_or_scaled_gives_the_same_picture() {
 
 #[test]
 fn photons_that_do_not_fit_make_room_and_lose_nothing() {
-    let (scene, packed) = load("cornell");
+    let (scene, packed) = load("furnace-closed");
     let render = |photons: u32| {
         let config = RenderConfig {
             radius: Some(0.05),
@@ -286,7 +293,18 @@ fn photons_that_do_not_fit_make_room_and_lose_nothing() {
         counters.repeated_iterations > 0,
         "the buffer was never too small: this test shows nothing"
     );
-    let per_path = counters.photons_stored as f64 / 4000.0;
-    assert!((2.0..4.0).contains(&per_path), "{per_path} photons a path");
+    // The CPU's buffers grow by themselves.
+    let config = RenderConfig {
+        radius: Some(0.05),
+        direct: Direct::Photons,
+        ..small(16, 2000)
+    };
+    let mut cpu = ppm_vk::cpu::Renderer::new(&packed, &scene.cameras[0], config).expect("renderer");
+    (0..2).for_each(|_| drop(cpu.iterate().expect("iteration")));
+    let (stored, expected) = (counters.photons_stored as f64, cpu.counters().photons_stored as f64);
+    assert!(
+        (stored / expected - 1.0).abs() < 2e-3,
+        "{stored} photons stored, {expected} on the CPU"
+    );
     assert_eq!(defects(&image), Defects::default());
 }

@@ -2,6 +2,8 @@
 
 const uint MISS = 0xffffffffu;
 
+const uint NO_LIGHT = 0xffffffffu;
+
 const uint MATTE = 0u;
 const uint MIRROR = 1u;
 const uint DIELECTRIC = 2u;
@@ -28,7 +30,7 @@ struct ShadingTriangle {
     uint object;
     uint material;
     uint smooth_shaded; // 1 where the shading normals differ from the geometric one
-    uint padding;
+    uint light;         // NO_LIGHT where it doesn't emit
 };
 
 struct Material {
@@ -84,6 +86,7 @@ struct Surface {
     uint triangle;
     uint object;
     uint material;
+    uint light;
 };
 
 vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_normal) {
@@ -110,6 +113,7 @@ Surface surface_at(uint index, vec2 uv) {
     surface.triangle = index;
     surface.object = triangle.object;
     surface.material = triangle.material;
+    surface.light = triangle.light;
     return surface;
 }
 

@@ -18,5 +18,5 @@ layout(std140) uniform Settings {
     float alpha;                // eq. 2
     float initial_radius2;      // R² of a visible point before its first photon, render units
     uint loop_limit;            // iterations that all loops of an invocation may make together
-    uint scan_padding;
+    float bsdf_sampling;        // probability that direct light is sampled by a direction of the BSDF, not a light's point
 } settings;

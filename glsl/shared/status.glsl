@@ -1,6 +1,5 @@
 // What the stages report to the host. Counters add up until the host clears them.
 struct StatusCounters {
-    uint photons_in_batch;    // that wanted to be stored, of the batch with the most
     uint lane_need;           // most photons that one invocation had to store
     uint truncated_paths;     // ended by max_depth
     uint cut_paths;           // ended by the driver's loop limit

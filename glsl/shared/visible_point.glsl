@@ -36,3 +36,7 @@ uint pixel_slots() {
     uvec2 tiles = (settings.resolution + TILE - 1u) / TILE;
     return tiles.x * tiles.y * TILE * TILE;
 }
+
+uint slots() {
+    return pixel_slots() * settings.slots_per_pixel;
+}

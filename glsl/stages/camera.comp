@@ -4,6 +4,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
@@ -36,7 +37,7 @@ struct Branch {
 };
 
 void main() {
-    uint pixel_slot = gl_GlobalInvocationID.x;
+    uint pixel_slot = invocation_index();
     if (pixel_slot >= pixel_slots()) {
         return;
     }

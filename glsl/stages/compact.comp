@@ -4,6 +4,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "texel.glsl"
 #include "photon.glsl"
@@ -17,9 +18,8 @@ layout(std430) writeonly buffer PhotonCount { uint photon_count; };
 layout(std430) writeonly buffer Photons { Photon photons[]; };
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_index();
     if (i == 0u) {
-        status.photons_in_batch = max(status.photons_in_batch, scan_total);
         photon_count = min(scan_total, settings.photon_capacity);
         if (scan_total > settings.photon_capacity) {
             atomicOr(status.again, PHOTONS_DID_NOT_FIT);

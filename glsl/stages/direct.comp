@@ -1,10 +1,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Adds what each visible point's path saw of the lights: by itself and, unless photons carry direct light too, by one
-// shadow ray to a point of a light chosen in proportion to its flux.
+// ray towards a light.
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
@@ -27,51 +28,71 @@ layout(push_constant) uniform Push {
 uniform usamplerBuffer VisiblePoints;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 
-vec3 sample_light(VisiblePoint visible_point, uint slot) {
+// One ray, by chance towards a point of a light or along a direction of the BSDF, with the density of both together
+// (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
+// variance next to a light.
+vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     Random random = random_for(LIGHT_SAMPLE, slot, push.iteration, settings.seed);
     vec4 u = next4(random);
-    Light light = light_at(choose_light(u.x));
-    vec2 uv = triangle_point(u.yz);
-    Surface emitter = surface_at(light.triangle, uv);
-    Material material = material_at(emitter.material);
+    bool by_bsdf = u.w < settings.bsdf_sampling;
 
     vec3 position = visible_point.position_object.xyz;
     vec3 geometric_normal = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
     vec3 shading_normal = decode_direction(floatBitsToUint(visible_point.emitted_normal.w));
-    vec3 to_light = emitter.position - position;
-    float distance2 = dot(to_light, to_light);
-    if (distance2 == 0.0) {
-        return vec3(0.0);
-    }
-    vec3 direction = to_light * inversesqrt(distance2);
-    float cos_light = -dot(direction, emitter.geometric_normal);
-    float cos_surface = dot(direction, shading_normal);
-    if (!emits(material, cos_light > 0.0) || cos_surface <= 0.0 || dot(direction, geometric_normal) <= 0.0) {
-        return vec3(0.0);
-    }
-    vec3 towards_surface = cos_light > 0.0 ? emitter.geometric_normal : -emitter.geometric_normal;
     vec3 origin = offset_origin(position, geometric_normal);
-    vec3 segment = offset_origin(emitter.position, towards_surface) - origin;
-    Hit blocker = trace(origin, segment, 1.0, light.triangle, true);
+    vec3 ray = cosine_direction(shading_normal, u.yz);
+    uint ignored = MISS;
+    Surface emitter;
+    if (!by_bsdf) {
+        Light light = light_at(choose_light(u.x));
+        emitter = surface_at(light.triangle, triangle_point(u.yz));
+        bool front = dot(position - emitter.position, emitter.geometric_normal) > 0.0;
+        // Both ends move off their surfaces.
+        ray = offset_origin(emitter.position, front ? emitter.geometric_normal : -emitter.geometric_normal) - origin;
+        ignored = light.triangle;
+    }
+    if (dot(ray, geometric_normal) <= 0.0 || dot(ray, shading_normal) <= 0.0) {
+        return vec3(0.0);
+    }
+    Hit hit = trace(origin, ray, by_bsdf ? 1e30 : 1.0, ignored, !by_bsdf);
     if (loops_cut) {
         atomicAdd(status.cut_paths, 1u);
     }
-    if (blocker.triangle != MISS) {
+    if (by_bsdf == (hit.triangle == MISS)) {
         return vec3(0.0);
     }
+    if (by_bsdf) {
+        emitter = surface_at(hit.triangle, vec2(hit.u, hit.v));
+    }
+    if (emitter.light == NO_LIGHT) {
+        return vec3(0.0);
+    }
+    Light light = light_at(emitter.light);
+    Material material = material_at(emitter.material);
+    vec3 to_light = emitter.position - position;
+    float distance2 = dot(to_light, to_light);
+    vec3 direction = to_light * inversesqrt(max(distance2, 1e-37));
+    float cos_light = -dot(direction, emitter.geometric_normal);
+    float cos_surface = dot(direction, shading_normal);
+    if (!emits(material, cos_light > 0.0) || cos_surface <= 0.0 || cos_light == 0.0) {
+        return vec3(0.0);
+    }
+    // Densities per solid angle.
+    float of_light = light.probability * distance2 / (light.area * abs(cos_light));
+    float of_bsdf = cos_surface / PI;
     return visible_point.weight_normal.rgb * material.emission *
-           (cos_surface * abs(cos_light) * light.area / (distance2 * light.probability));
+           (cos_surface / mix(of_light, of_bsdf, settings.bsdf_sampling));
 }
 
 void main() {
-    uint slot = gl_GlobalInvocationID.x;
-    if (slot >= pixel_slots() * settings.slots_per_pixel || status.again != 0u) {
+    uint slot = invocation_index();
+    if (slot >= slots() || status.again != 0u) {
         return;
     }
     VisiblePoint visible_point = VISIBLE_POINT(slot);
     vec3 radiance = visible_point.emitted_normal.rgb;
     if (SAMPLE_LIGHTS && floatBitsToUint(visible_point.position_object.w) != NO_OBJECT) {
-        radiance += sample_light(visible_point, slot);
+        radiance += sample_direct(visible_point, slot);
     }
     if (!finite(radiance)) {
         atomicAdd(status.non_finite, 1u);

@@ -5,6 +5,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "texel.glsl"
 #include "sampling.glsl"
@@ -22,10 +23,10 @@ layout(std430) buffer GatheredOf { Gathered gathered[]; };
 layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
 void main() {
-    uint slot = gl_GlobalInvocationID.x;
+    uint slot = invocation_index();
     bool counts = false;
     float radius2 = 0.0;
-    if (slot < pixel_slots() * settings.slots_per_pixel) {
+    if (slot < slots()) {
         counts = floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w) != NO_OBJECT;
         radius2 = statistics[slot].radius2_high;
         float found = float(floatBitsToUint(gathered[slot].flux_count.w));
@@ -36,7 +37,7 @@ void main() {
         gathered[slot].flux_count = vec4(0.0);
     }
     RadiusSum sum = sum_of_radii(counts, radius2);
-    if (gl_LocalInvocationID.x == 0u) {
-        radius_sums[gl_WorkGroupID.x] = sum;
+    if (gl_LocalInvocationID.x == 0u && slot < slots()) {
+        radius_sums[workgroup_index()] = sum;
     }
 }

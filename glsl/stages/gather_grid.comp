@@ -4,6 +4,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "texel.glsl"
 #include "sampling.glsl"
@@ -29,8 +30,8 @@ uniform usamplerBuffer CellRanges;
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 
 void main() {
-    uint slot = gl_GlobalInvocationID.x;
-    if (slot >= pixel_slots() * settings.slots_per_pixel) {
+    uint slot = invocation_index();
+    if (slot >= slots()) {
         return;
     }
     Receiver receiver = receiver_of(VISIBLE_POINT(slot), TEXEL(StatisticsOf, 3u * slot).x);

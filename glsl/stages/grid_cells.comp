@@ -4,6 +4,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "texel.glsl"
 #include "photon.glsl"
 
@@ -23,7 +24,7 @@ layout(std430) writeonly buffer SortedPhotons { Photon sorted_photons[]; };
 layout(std430) writeonly buffer CellRanges { CellRange cell_ranges[]; }; // cleared before: empty buckets are (0, 0)
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_index();
     if (i >= photon_count) {
         return;
     }

@@ -4,6 +4,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "texel.glsl"
 #include "photon.glsl"
@@ -17,7 +18,7 @@ layout(std430) writeonly buffer Keys { uint keys[]; };
 layout(std430) writeonly buffer Values { uint values[]; };
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_index();
     if (i >= photon_count) {
         return;
     }

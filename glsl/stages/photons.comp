@@ -6,6 +6,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "random.glsl"
@@ -71,7 +72,7 @@ bool survives(inout vec3 flux, vec3 scattered, float u) {
 }
 
 void main() {
-    uint lane = gl_GlobalInvocationID.x;
+    uint lane = invocation_index();
     if (lane >= settings.photon_lanes) {
         return;
     }

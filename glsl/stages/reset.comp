@@ -4,6 +4,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "visible_point.glsl"
@@ -14,12 +15,12 @@ layout(std430) writeonly buffer GatheredOf { Gathered gathered[]; };
 layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
 void main() {
-    uint slot = gl_GlobalInvocationID.x;
-    if (slot < pixel_slots() * settings.slots_per_pixel) {
+    uint slot = invocation_index();
+    if (slot < slots()) {
         statistics[slot] = Statistics(settings.initial_radius2, 0.0, 0u, 0u, vec4(0.0), vec4(0.0));
         gathered[slot].flux_count = vec4(0.0);
     }
-    if (gl_LocalInvocationID.x == 0u) {
-        radius_sums[gl_WorkGroupID.x] = RadiusSum(sqrt(settings.initial_radius2), settings.initial_radius2, 1u, 0u);
+    if (gl_LocalInvocationID.x == 0u && slot < slots()) {
+        radius_sums[workgroup_index()] = RadiusSum(sqrt(settings.initial_radius2), settings.initial_radius2, 1u, 0u);
     }
 }

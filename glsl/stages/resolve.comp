@@ -4,6 +4,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "visible_point.glsl"
@@ -19,7 +20,7 @@ layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
 layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left
 
 void main() {
-    uint pixel_slot = gl_GlobalInvocationID.x;
+    uint pixel_slot = invocation_index();
     if (pixel_slot >= pixel_slots()) {
         return;
     }

@@ -5,6 +5,8 @@
 
 layout(local_size_x = 128) in;
 
+#include "invocation.glsl"
+
 const uint PER_THREAD = 16u;
 
 layout(push_constant) uniform Push {
@@ -17,7 +19,7 @@ layout(std430) writeonly buffer ScanSums { uint scan_sums[]; };
 #include "workgroup_scan.glsl"
 
 void main() {
-    uint first = (gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationID.x) * PER_THREAD;
+    uint first = invocation_index() * PER_THREAD;
     uint values[PER_THREAD];
     uint sum = 0u;
     for (uint i = 0u; i < PER_THREAD; i++) {
@@ -32,7 +34,7 @@ void main() {
         }
         before += values[i];
     }
-    if (gl_LocalInvocationID.x == 0u) {
-        scan_sums[gl_WorkGroupID.x] = total;
+    if (gl_LocalInvocationID.x == 0u && first < push.count) {
+        scan_sums[workgroup_index()] = total;
     }
 }

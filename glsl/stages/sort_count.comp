@@ -4,6 +4,8 @@
 
 layout(local_size_x = 128) in;
 
+#include "invocation.glsl"
+
 layout(push_constant) uniform Push {
     uint shift;
     uint tiles;
@@ -23,13 +25,13 @@ void main() {
     }
     barrier();
     for (uint i = 0u; i < KEYS_PER_THREAD; i++) {
-        uint index = gl_WorkGroupID.x * TILE_KEYS + i * gl_WorkGroupSize.x + me;
+        uint index = workgroup_index() * TILE_KEYS + i * gl_WorkGroupSize.x + me;
         if (index < sort_count) {
             atomicAdd(counts[digit_of(keys_in[index], push.shift)], 1u);
         }
     }
     barrier();
-    if (me < DIGITS) {
-        histograms[me * push.tiles + gl_WorkGroupID.x] = counts[me];
+    if (me < DIGITS && workgroup_index() < push.tiles) {
+        histograms[me * push.tiles + workgroup_index()] = counts[me];
     }
 }

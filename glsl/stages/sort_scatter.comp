@@ -4,6 +4,8 @@
 
 layout(local_size_x = 128) in;
 
+#include "invocation.glsl"
+
 layout(push_constant) uniform Push {
     uint shift;
     uint tiles;
@@ -25,14 +27,14 @@ void main() {
     for (uint digit = 0u; digit < DIGITS; digit++) {
         places[digit * gl_WorkGroupSize.x + me] = 0u;
     }
-    uint first = gl_WorkGroupID.x * TILE_KEYS + me * KEYS_PER_THREAD;
+    uint first = workgroup_index() * TILE_KEYS + me * KEYS_PER_THREAD;
     uint last = min(first + KEYS_PER_THREAD, sort_count);
     for (uint i = first; i < last; i++) {
         places[digit_of(keys_in[i], push.shift) * gl_WorkGroupSize.x + me] += 1u;
     }
     barrier();
-    if (me < DIGITS) {
-        uint place = histograms[me * push.tiles + gl_WorkGroupID.x];
+    if (me < DIGITS && workgroup_index() < push.tiles) {
+        uint place = histograms[me * push.tiles + workgroup_index()];
         for (uint thread = 0u; thread < gl_WorkGroupSize.x; thread++) {
             uint count = places[me * gl_WorkGroupSize.x + thread];
             places[me * gl_WorkGroupSize.x + thread] = place;

@@ -5,6 +5,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "settings.glsl"
 #include "texel.glsl"
 #include "sampling.glsl"
@@ -21,10 +22,10 @@ layout(std430) buffer GatheredOf { Gathered gathered[]; };
 layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
 void main() {
-    uint slot = gl_GlobalInvocationID.x;
+    uint slot = invocation_index();
     bool counts = false;
     float radius2 = 0.0;
-    if (slot < pixel_slots() * settings.slots_per_pixel && status.again == 0u) {
+    if (slot < slots() && status.again == 0u) {
         VisiblePoint visible_point = VISIBLE_POINT(slot);
         Statistics mine = statistics[slot];
         counts = floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
@@ -42,7 +43,7 @@ void main() {
         radius2 = mine.radius2_high;
     }
     RadiusSum sum = sum_of_radii(counts, radius2);
-    if (gl_LocalInvocationID.x == 0u && status.again == 0u) {
-        radius_sums[gl_WorkGroupID.x] = sum;
+    if (gl_LocalInvocationID.x == 0u && slot < slots() && status.again == 0u) {
+        radius_sums[workgroup_index()] = sum;
     }
 }

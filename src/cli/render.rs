@@ -119,7 +119,7 @@ fn open(
             let device = Device::open(arguments.device.as_deref())?;
             Box::new(Renderer::new(device, scene, camera, config.clone())?)
         }
-        BackendChoice::Cpu => anyhow::bail!("cpu backend: not yet"),
+        BackendChoice::Cpu => Box::new(crate::cpu::Renderer::new(scene, camera, config.clone())?),
     })
 }
 

@@ -8,7 +8,7 @@ use super::{
     Batch, Counts, Inputs, camera, compact, direct, fit_radius, gather_kd_tree, photons, reset, resolve, update,
 };
 use crate::backend::{Backend, Counters, DeviceDescription, settings};
-use crate::config::{DeviceLimits, Estimator, RenderConfig, Sizes};
+use crate::config::{Estimator, Limits, RenderConfig, Sizes};
 use crate::error::Result;
 use crate::film::Image;
 use crate::layout::{DirectSum, Gathered, Settings, Statistics, VisiblePoint};
@@ -21,11 +21,6 @@ use crate::scene::{Camera, PackedScene};
 const LANES: u32 = 4096;
 /// Bytes of a batch's photons at the most.
 const PHOTON_BYTES: u64 = 1 << 30;
-
-/// The iteration whose photons the radius is found from; no render gets that far.
-const PILOT: u32 = u32::MAX;
-/// Rounds of shrinking the radius where photons are denser than wanted.
-const FITS: u32 = 2;
 
 /// A progressive render on the CPU, with all threads of rayon's pool.
 pub struct Renderer {
@@ -51,10 +46,11 @@ impl Renderer {
     /// A setting outside its range, or more photons in a batch than the kd-tree can number.
     pub fn new(scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
         config.check()?;
-        let limits = DeviceLimits {
+        let limits = Limits {
             storage_buffer_bytes: PHOTON_BYTES,
             loop_limit: u32::MAX,
             lanes: LANES,
+            glass: scene.has_glass(),
         };
         let sizes = Sizes::new(&config, limits);
         let slots = sizes.slots() as usize;
@@ -107,7 +103,7 @@ impl Renderer {
         let visible_points = camera(&inputs, 0, &counts);
         let photons = compact(&photons(
             &inputs,
-            batch_of(&self.sizes, &self.config, PILOT, 0),
+            batch_of(&self.sizes, &self.config, radius::PILOT, 0),
             &counts,
         ));
         // The pilot is a batch; the densities of the whole iteration's photons are higher.
@@ -115,7 +111,7 @@ impl Renderer {
         let radius = radius::automatic(&visible_points, &photons) as f32;
         self.settings.initial_radius2 = radius * radius * share;
         self.statistics = vec![reset(self.settings.initial_radius2); slots];
-        for _ in 0..FITS {
+        for _ in 0..radius::FITS {
             gather_kd_tree(&visible_points, &self.statistics, &photons, &mut self.gathered)?;
             fit_radius(
                 radius::PHOTONS_WANTED as f32 * share,

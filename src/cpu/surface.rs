@@ -22,6 +22,8 @@ pub(super) struct Surface<'a> {
     pub shading_normal: DVec3,
     pub object: u32,
     pub material: &'a Material,
+    /// Index of its light, or [`crate::layout::NO_LIGHT`].
+    pub light: u32,
 }
 
 /// The point with the barycentric coordinates `u` and `v` of the second and the third corner.
@@ -35,6 +37,7 @@ pub(super) fn surface_at(scene: &PackedScene, triangle: u32, u: f64, v: f64) -> 
         shading_normal: interpolated_normal(triangle, u, v, geometric_normal),
         object: triangle.object,
         material: &scene.materials[triangle.material as usize],
+        light: triangle.light,
     }
 }
 

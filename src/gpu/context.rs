@@ -47,6 +47,8 @@ pub struct DeviceSummary {
     pub subgroup_size: u32,
     /// Bytes that one storage buffer binding can span.
     pub max_storage_buffer_bytes: u64,
+    /// 16-byte texels that one texel buffer can have.
+    pub max_texels: u32,
     /// Bytes of shared memory of a workgroup.
     pub max_shared_memory_bytes: u32,
     /// What the device lacks to run the program; empty if nothing.
@@ -244,6 +246,7 @@ impl Instance {
             timestamp_period_ns: limits.timestamp_period,
             subgroup_size: subgroup.subgroup_size,
             max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+            max_texels: limits.max_texel_buffer_elements,
             max_shared_memory_bytes: limits.max_compute_shared_memory_size,
             lacks,
         }

@@ -73,7 +73,8 @@ impl Device {
                             }
                             let all = vk::PipelineStageFlags::ALL_COMMANDS;
                             device.cmd_write_timestamp(commands, all, scratch.queries, 2 * next as u32);
-                            device.cmd_dispatch(commands, stage.groups(), 1, 1);
+                            let [columns, rows] = layout_of(stage.groups());
+                            device.cmd_dispatch(commands, columns, rows, 1);
                             device.cmd_write_timestamp(commands, all, scratch.queries, 2 * next as u32 + 1);
                             context.end_label(commands);
                             next += 1;
@@ -179,6 +180,12 @@ impl Device {
             .map(|buffer| buffer.handle)
             .ok_or_else(|| Error::Device(format!("buffer {id:?} is used before it is made")))
     }
+}
+
+/// Workgroups in rows of no more than every device allows; at least `groups` of them.
+fn layout_of(groups: u32) -> [u32; 2] {
+    let rows = groups.div_ceil(65_535);
+    [groups.div_ceil(rows), rows]
 }
 
 /// Records, submits, waits; returns the time from the submission to the fence.
@@ -323,6 +330,15 @@ impl Scratch {
                     .buffer_info(&info);
                 let view;
                 if access == Access::Texels {
+                    if buffer.bytes / 16 > u64::from(device.summary.max_texels) {
+                        return Err(Error::Device(format!(
+                            "{id:?} has {} texels, device {} reads {} at most; try fewer --photons, a smaller \
+                             --resolution or another --device",
+                            buffer.bytes / 16,
+                            device.summary.name,
+                            device.summary.max_texels
+                        )));
+                    }
                     view = [buffer.texels(&device.context)?];
                     write = write.texel_buffer_view(&view);
                 }

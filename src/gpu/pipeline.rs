@@ -23,10 +23,13 @@ pub(super) struct Pipeline {
     pub set_layout: vk::DescriptorSetLayout,
 }
 
+/// A shader's name and its specialisation constants, by id.
+type Key = (&'static str, Vec<(u32, u32)>);
+
 #[derive(Default)]
 pub(super) struct Pipelines {
     layouts: HashMap<&'static str, Layouts>,
-    pipelines: HashMap<(&'static str, Vec<(u32, u32)>), Pipeline>,
+    pipelines: HashMap<Key, Pipeline>,
 }
 
 pub(super) fn descriptor_type(access: Access) -> vk::DescriptorType {

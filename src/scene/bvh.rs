@@ -64,6 +64,14 @@ struct Packed<'a> {
     nodes: Vec<BvhNode>,
 }
 
+/// An inner node of the tree that is still to be packed.
+struct Pending {
+    index: usize,
+    /// The packed node that refers to it, and whether as its right child.
+    parent: Option<(usize, bool)>,
+    depth: usize,
+}
+
 /// A child that no ray enters.
 fn nothing() -> ([f32; 4], [f32; 4]) {
     ([1e30, 1e30, 1e30, 0.0], [1e30, 1e30, 1e30, f32::from_bits(1)])
@@ -86,9 +94,12 @@ impl Packed<'_> {
             return 1;
         }
         let mut deepest = 0;
-        // Index of a tree node, the packed node and side that refer to it, its depth.
-        let mut stack: Vec<(usize, Option<(usize, bool)>, usize)> = vec![(0, None, 1)];
-        while let Some((index, parent, depth)) = stack.pop() {
+        let mut stack = vec![Pending {
+            index: 0,
+            parent: None,
+            depth: 1,
+        }];
+        while let Some(Pending { index, parent, depth }) = stack.pop() {
             deepest = deepest.max(depth);
             let me = self.nodes.len();
             if let Some((parent, right)) = parent {
@@ -111,10 +122,18 @@ impl Packed<'_> {
                 right_max,
             });
             if !right.is_leaf() {
-                stack.push((first + 1, Some((me, true)), depth + 1));
+                stack.push(Pending {
+                    index: first + 1,
+                    parent: Some((me, true)),
+                    depth: depth + 1,
+                });
             }
             if !left.is_leaf() {
-                stack.push((first, Some((me, false)), depth + 1));
+                stack.push(Pending {
+                    index: first,
+                    parent: Some((me, false)),
+                    depth: depth + 1,
+                });
             }
         }
         deepest

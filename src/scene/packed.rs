@@ -3,7 +3,10 @@
 use glam::{DVec3, Vec3};
 
 use super::{Scene, Surface, bvh};
-use crate::layout::{BvhNode, HavelTriangle, Light, Material, ShadingTriangle};
+use crate::layout::{BvhNode, HavelTriangle, Light, Material, NO_LIGHT, ShadingTriangle};
+
+/// A dielectric's [`Material::surface`].
+const DIELECTRIC: u32 = 2;
 
 /// What the ray stages read, in the order of the BVH's leaves.
 #[derive(Debug, Clone)]
@@ -24,6 +27,8 @@ pub struct PackedScene {
     pub order: Vec<u32>,
     /// Render units per scene unit.
     pub scale: f64,
+    /// Probability that direct light is sampled by a direction of the BSDF instead of a light's point.
+    pub bsdf_sampling: f32,
 }
 
 impl PackedScene {
@@ -40,14 +45,17 @@ impl PackedScene {
         let bvh = bvh::build(&corners)?;
         let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| corners[index as usize]).collect();
         let (lights, light_flux) = lights(scene, &bvh.order);
+        let shaded = bvh.order.iter().zip(&corners);
+        let mut shading_triangles: Vec<_> = shaded
+            .map(|(&index, corners)| shading_triangle(scene, index, corners))
+            .collect();
+        for (index, light) in lights.iter().enumerate() {
+            shading_triangles[light.triangle as usize].light = index as u32;
+        }
         Ok(Self {
             havel_triangles: corners.iter().map(havel_triangle).collect(),
-            shading_triangles: bvh
-                .order
-                .iter()
-                .zip(&corners)
-                .map(|(&index, corners)| shading_triangle(scene, index, corners))
-                .collect(),
+            shading_triangles,
+            bsdf_sampling: bsdf_sampling(scene, &lights),
             materials: scene.materials.iter().map(material).collect(),
             lights,
             light_flux,
@@ -55,6 +63,13 @@ impl PackedScene {
             order: bvh.order,
             scale: scene.normalisation.scale,
         })
+    }
+}
+
+impl PackedScene {
+    /// Whether a path can split in two at some surface.
+    pub fn has_glass(&self) -> bool {
+        self.materials.iter().any(|material| material.surface == DIELECTRIC)
     }
 }
 
@@ -94,7 +109,7 @@ fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTr
         object: triangle.object,
         material: scene.objects[triangle.object as usize].material,
         smooth_shaded: smooth_shaded.into(),
-        padding: 0,
+        light: NO_LIGHT,
     }
 }
 
@@ -102,7 +117,7 @@ fn material(material: &super::Material) -> Material {
     let (surface, ior) = match material.surface {
         Surface::Matte => (0, 1.0),
         Surface::Mirror => (1, 1.0),
-        Surface::Dielectric { ior } => (2, ior),
+        Surface::Dielectric { ior } => (DIELECTRIC, ior),
     };
     Material {
         base_color: material.base_color.to_array(),
@@ -114,6 +129,16 @@ fn material(material: &super::Material) -> Material {
         padding1: 0,
         padding2: 0,
     }
+}
+
+/// The part of the scene's area that emits is about the chance that a direction of the BSDF meets a light. Never 0: it
+/// bounds the contribution of a light's point next to the surface.
+fn bsdf_sampling(scene: &Scene, lights: &[Light]) -> f32 {
+    let all: f64 = (0..scene.triangles.len() as u32)
+        .map(|triangle| scene.triangle_area(triangle))
+        .sum();
+    let emissive: f64 = lights.iter().map(|light| f64::from(light.area)).sum();
+    ((emissive / all) as f32).clamp(0.05, 0.5)
 }
 
 /// Emissive triangles in leaf order, with probabilities in proportion to their flux.

@@ -142,8 +142,8 @@ fn one_seed_gives_the_same_bits_whatever_the_number_of_threads() {
 
 #[test]
 fn a_closed_furnace_shines_with_emission_over_one_minus_albedo() {
-    // Le = (1, 0.5, 0.25), ρ = (0.2, 0.5, 0.8).
-    let expected = [1.25, 1.0, 1.25];
+    // Le = 1, ρ = (0.2, 0.5, 0.8).
+    let expected = [1.25, 2.0, 5.0];
     for direct in [Direct::Light, Direct::Photons] {
         let config = RenderConfig {
             direct,

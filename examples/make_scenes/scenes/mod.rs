@@ -158,7 +158,7 @@ fn furnace_specular() -> Document {
 /// A closed matte room whose six sides emit Le and reflect ρ: radiance is Le / (1 − ρ) everywhere.
 fn furnace_closed() -> Document {
     const ALBEDO: [f64; 3] = [0.2, 0.5, 0.8];
-    const EMISSION: [f64; 3] = [1.0, 0.5, 0.25];
+    const EMISSION: [f64; 3] = [1.0; 3];
     let mut scene = Document::new("furnace-closed");
     let wall = scene.material(emitting(matte("wall", ALBEDO), EMISSION));
     scene.object("floor", &Mesh::facing_up(ROOM, 0.0), wall);
