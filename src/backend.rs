@@ -61,12 +61,11 @@ impl Counters {
     /// What of it a user has to know, one line each.
     pub fn warnings(&self, emitted: u64, max_depth: u32) -> Vec<String> {
         let mut warnings = Vec::new();
-        let share = |paths: u64| 100.0 * paths as f64 / emitted.max(1) as f64;
         if self.truncated_paths > 0 {
             warnings.push(format!(
-                "{} paths ({:.4} % of the photon paths) reached --max-depth {max_depth}; their further light is missing",
-                self.truncated_paths,
-                share(self.truncated_paths)
+                "{} camera and photon paths reached --max-depth {max_depth} ({emitted} photon paths were emitted); their \
+                 further light is missing",
+                self.truncated_paths
             ));
         }
         if self.cut_paths > 0 {

@@ -1,5 +1,12 @@
 //! The command line: arguments to settings, and one function a command.
 
+/// Prints a line to stderr; a stderr that can't be written to is no error.
+macro_rules! say {
+    ($($text:tt)*) => {
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    };
+}
+
 mod args;
 mod interrupt;
 mod list;

@@ -196,7 +196,8 @@ impl Sizes {
 
     /// Takes fewer photon paths at once until the photons of a batch fit into one buffer.
     pub fn shrink_batch(&mut self, limits: &Limits) {
-        let bytes = |sizes: &Self| u64::from(sizes.photon_capacity()) * size_of::<Photon>() as u64;
+        let bytes =
+            |sizes: &Self| u64::from(sizes.photon_lanes) * u64::from(sizes.lane_capacity) * size_of::<Photon>() as u64;
         while bytes(self) > limits.storage_buffer_bytes && self.batch_paths > 1 {
             let paths = self.paths_per_lane();
             let capacity = self.lane_capacity;
@@ -218,7 +219,7 @@ impl Sizes {
 
     /// Photons that a batch can store.
     pub fn photon_capacity(&self) -> u32 {
-        self.photon_lanes * self.lane_capacity
+        self.photon_lanes.saturating_mul(self.lane_capacity)
     }
 
     /// Batches of an iteration of `paths` photon paths.

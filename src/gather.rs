@@ -105,8 +105,9 @@ fn naive(sizes: &Sizes, recording: &mut Recording) {
 }
 
 fn grid(sizes: &Sizes, recording: &mut Recording) {
-    let radius_sums = sizes.slots().div_ceil(shaders::UPDATE.workgroup);
     let photons = sizes.photon_capacity();
+    let radius_sums = sizes.slots().div_ceil(shaders::GRID_RADII.workgroup);
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, sizes.slots()));
     recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup).push(radius_sums));
     recording.dispatch(StageDesc::new(&shaders::GRID_KEYS, photons));
     sort(BufferId::PhotonCount, photons, sizes.cell_bits, recording);

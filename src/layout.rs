@@ -217,15 +217,9 @@ device_structs! {
     }
 
     /// The hashed grid of an iteration.
-    pub struct GridShape: 16 {
+    pub struct GridShape: 4 {
         /// 1 / cell size.
         pub inverse_cell_size: f32,
-        /// Edge of a cell.
-        pub cell_size: f32,
-        /// Mean radius of the visible points.
-        pub mean_radius: f32,
-        /// The largest R².
-        pub largest_radius2: f32,
     }
 
     /// A grid bucket's photons in the sorted order.

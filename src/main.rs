@@ -1,5 +1,6 @@
 //! The `ppm-vk` program. Exit codes: 0 done, 1 the work failed, 2 the arguments are wrong, 130 interrupted.
 
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use ppm_vk::cli::{self, Outcome};
@@ -9,7 +10,8 @@ fn main() -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            // A stderr that can't be written to must not change the exit code.
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
             ExitCode::FAILURE
         }
     }

@@ -77,6 +77,9 @@ pub struct Renderer {
     counters: Counters,
 }
 
+/// How often an iteration is done at the most: every other time halves what its loops have to do.
+const REPEATS: u32 = 24;
+
 /// Loop iterations that photon paths of a lane may make together where the driver has a limit: a subgroup's lanes share
 /// it on the driver that has one, and an inner loop runs as long as its slowest lane.
 fn loop_budget(limit: u32) -> u32 {
@@ -96,6 +99,14 @@ impl Renderer {
             lanes: if device.summary().kind == "cpu" { 4096 } else { 1 << 18 },
             glass: scene.has_glass(),
         };
+        let triangles = scene.shading_triangles.len() as u32;
+        if config.accel == Accel::Brute && triangles > limits.loop_limit {
+            return Err(Error::Device(format!(
+                "--accel brute: device {} ends loops early, and the scene has {triangles} triangles; use --accel bvh or \
+                 another --device",
+                device.summary().name
+            )));
+        }
         let sizes = Sizes::new(&config, limits);
         device.upload(BufferId::Bvh, &scene.bvh)?;
         device.upload(BufferId::HavelTriangles, &scene.havel_triangles)?;
@@ -126,58 +137,65 @@ impl Renderer {
         }
     }
 
-    /// Runs an iteration; where photons don't fit or loops are cut, makes room and does it again.
-    fn run_until_it_fits(&mut self, recording: &Recording) -> Result<Run> {
-        let mut run = self.device.run(recording)?;
-        loop {
+    /// Runs what `record` says; where photons don't fit or loops are cut, makes room and does it again. Returns what all
+    /// of it took, and what the last run reported.
+    fn run_until_it_fits(&mut self, record: impl Fn(Stages<'_>) -> Recording) -> Result<(Run, StatusCounters)> {
+        let mut all = Run::default();
+        for _ in 0..REPEATS {
+            let run = self.device.run(&record(self.stages()))?;
+            all.launches.extend(run.launches);
+            all.wall += run.wall;
             let status = self.take_status()?;
             if status.again == 0 {
-                self.counters.photons_stored +=
-                    u64::from(status.photons_stored_low) | u64::from(status.photons_stored_high) << 32;
-                self.counters.truncated_paths += u64::from(status.truncated_paths);
-                self.counters.cut_paths += u64::from(status.cut_paths);
-                self.counters.non_finite += u64::from(status.non_finite);
-                return Ok(run);
+                return Ok((all, status));
             }
+            self.counters.repeated_iterations += 1;
             self.make_room(&status)?;
-            run = self.device.run(&self.stages().iteration(self.iterations))?;
         }
+        Err(Error::Device(format!(
+            "device {} cuts loops however small their parts; use another --device or --backend cpu",
+            self.device.summary().name
+        )))
     }
 
     /// After an iteration that has to be done again: sizes that it needs, and what it gathered forgotten.
     fn make_room(&mut self, status: &StatusCounters) -> Result<()> {
-        self.counters.repeated_iterations += 1;
         // Dealt anew, the lanes' photons are estimated anew.
         if status.again & LANES_TOO_LONG != 0 {
             self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
         } else if status.again & PHOTONS_DID_NOT_FIT != 0 {
-            self.sizes.lane_capacity = self
-                .sizes
-                .lane_capacity
-                .max(status.lane_need + status.lane_need / 4 + 1);
+            let need = status.lane_need.saturating_add(status.lane_need / 4 + 1);
+            self.sizes.lane_capacity = self.sizes.lane_capacity.max(need);
         }
-        self.sizes.shrink_batch(&self.limits);
+        if status.again & (LANES_TOO_LONG | PHOTONS_DID_NOT_FIT) != 0 {
+            self.sizes.shrink_batch(&self.limits);
+            self.create_photon_buffers()?;
+        }
         if status.again & GATHERS_TOO_LONG != 0 {
-            self.sizes.gather_parts *= 2;
+            self.sizes.gather_parts = self.sizes.gather_parts.saturating_mul(2);
         }
-        self.create_photon_buffers()?;
         let mut recording = Recording::new();
         recording.fill(BufferId::GatheredOf, 0);
         self.device.run(&recording).map(|_| ())
     }
 
+    /// What was reported since the last call.
     fn take_status(&mut self) -> Result<StatusCounters> {
         let status: Vec<StatusCounters> = self.device.download(BufferId::Status, Some(1))?;
-        let mut recording = Recording::new();
-        recording.fill(BufferId::Status, 0);
-        self.device.run(&recording)?;
+        self.clear_status()?;
         status
             .first()
             .copied()
             .ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
     }
 
-    /// Sizes of the buffers.
+    fn clear_status(&mut self) -> Result<()> {
+        let mut recording = Recording::new();
+        recording.fill(BufferId::Status, 0);
+        self.device.run(&recording).map(|_| ())
+    }
+
+    /// The buffers' sizes.
     pub fn sizes(&self) -> &Sizes {
         &self.sizes
     }
@@ -191,7 +209,7 @@ impl Renderer {
         use crate::layout::{DirectSum, Gathered, RadiusSum, Statistics};
         let slots = u64::from(self.sizes.slots());
         let pixels = u64::from(self.config.resolution[0]) * u64::from(self.config.resolution[1]);
-        let groups = slots.div_ceil(u64::from(shaders::UPDATE.workgroup));
+        let groups = slots.div_ceil(u64::from(shaders::GRID_RADII.workgroup));
         for (id, count, size) in [
             (BufferId::VisiblePoints, slots, size_of::<VisiblePoint>()),
             (BufferId::StatisticsOf, slots, size_of::<Statistics>()),
@@ -247,18 +265,13 @@ impl Renderer {
         if self.config.radius.is_some() {
             return self.reset();
         }
-        loop {
+        self.clear_status()?;
+        self.run_until_it_fits(|stages| {
             let mut recording = Recording::new();
-            recording.fill(BufferId::Status, 0);
-            self.stages().camera(0, &mut recording);
-            self.stages().photons(radius::PILOT, 0, &mut recording);
-            self.device.run(&recording)?;
-            let status = self.take_status()?;
-            if status.again == 0 {
-                break;
-            }
-            self.make_room(&status)?;
-        }
+            stages.camera(0, &mut recording);
+            stages.photons(radius::PILOT, 0, &mut recording);
+            recording
+        })?;
         let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
         let count: Vec<u32> = self.device.download(BufferId::PhotonCount, Some(1))?;
         let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
@@ -269,13 +282,17 @@ impl Renderer {
         self.device.upload(BufferId::Settings, &[self.settings])?;
         self.reset()?;
         for _ in 0..radius::FITS {
+            self.run_until_it_fits(|stages| {
+                let mut recording = Recording::new();
+                (METHODS[stages.config.gather].record)(stages.sizes, &mut recording);
+                recording
+            })?;
+            let wanted = radius::PHOTONS_WANTED as f32 * share;
             let mut recording = Recording::new();
-            (METHODS[self.config.gather].record)(&self.sizes, &mut recording);
-            recording.dispatch(
-                StageDesc::new(&shaders::FIT_RADIUS, self.sizes.slots()).push(radius::PHOTONS_WANTED as f32 * share),
-            );
+            recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, self.sizes.slots()).push(wanted));
             self.device.run(&recording)?;
         }
+        self.counters = Counters::default();
         Ok(())
     }
 
@@ -290,8 +307,13 @@ impl Renderer {
 
 impl Backend for Renderer {
     fn iterate(&mut self) -> Result<Run> {
-        let recording = self.stages().iteration(self.iterations);
-        let run = self.run_until_it_fits(&recording)?;
+        let iteration = self.iterations;
+        let (run, status) = self.run_until_it_fits(|stages| stages.iteration(iteration))?;
+        let counters = &mut self.counters;
+        counters.photons_stored += u64::from(status.photons_stored_low) | u64::from(status.photons_stored_high) << 32;
+        counters.truncated_paths += u64::from(status.truncated_paths);
+        counters.cut_paths += u64::from(status.cut_paths);
+        counters.non_finite += u64::from(status.non_finite);
         self.iterations += 1;
         self.emitted += u64::from(self.config.photons);
         Ok(run)
@@ -302,6 +324,7 @@ impl Backend for Renderer {
         let push = [self.iterations.max(1), (self.emitted.max(1) as f32).to_bits()];
         recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
         self.device.run(&recording)?;
+        self.counters.non_finite += u64::from(self.take_status()?.non_finite);
         let [width, height] = self.config.resolution.map(|side| side as usize);
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
         Ok(Image::new(

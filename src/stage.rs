@@ -171,6 +171,14 @@ pub struct Shader {
     pub constants: &'static [SpecConstant],
 }
 
+impl Shader {
+    /// Storage buffers that it binds.
+    pub fn storage_buffers(&self) -> usize {
+        let storage = |access| matches!(access, Access::Read | Access::Write | Access::ReadWrite);
+        self.bindings.iter().filter(|binding| storage(binding.access)).count()
+    }
+}
+
 /// A launch of a stage.
 #[derive(Debug, Clone)]
 pub struct StageDesc {

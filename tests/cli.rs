@@ -241,6 +241,8 @@ fn arguments_out_of_range_are_refused() {
         ("--iterations", "0"),
         ("--max-depth", "0"),
         ("--time", "0"),
+        ("--time", "1e300"),
+        ("--time", "nan"),
         ("--gather", "magic"),
         ("--estimator", "magic"),
         ("--seed", "-1"),
@@ -263,6 +265,76 @@ fn an_unwritable_output_fails_before_any_work() {
     assert_fails(&folder, &output, &["no-such-folder"]);
     let output = small_render(folder.path(), &scene, &["--png", "no-such-folder/o.png"]);
     assert_fails(&folder, &output, &["no-such-folder"]);
+}
+
+#[test]
+fn outputs_overwrite_neither_each_other_nor_the_scene() {
+    let folder = TempDir::new().expect("folder");
+    let copy = folder.path().join("a.b.gltf");
+    std::fs::copy(scene("cornell.gltf"), &copy).expect("scene");
+    std::fs::copy(scene("cornell.bin"), folder.path().join("cornell.bin")).expect("buffer");
+    assert_fails(
+        &folder,
+        &small_render(folder.path(), &copy, &["-o", "a.b.gltf"]),
+        &["overwrite"],
+    );
+    assert_fails(
+        &folder,
+        &small_render(folder.path(), &copy, &["-o", "x", "--png", "./x"]),
+        &["overwrite"],
+    );
+    let output = small_render(folder.path(), &copy, &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(folder.path().join("a.b.exr").exists(), "{:?}", files(folder.path()));
+}
+
+#[test]
+fn extreme_radii_and_alphas_end_with_a_finite_picture() {
+    let folder = TempDir::new().expect("folder");
+    for more in [
+        ["--radius", "1e-9"],
+        ["--radius", "1e9"],
+        ["--alpha", "1e-9"],
+        ["--alpha", "0.999999"],
+    ] {
+        let mut arguments = vec!["--iterations", "3", "-o", "o.exr", "--scene"];
+        let scene = scene("cornell.gltf");
+        arguments.extend([
+            scene.to_str().expect("UTF-8"),
+            "--resolution",
+            "16x16",
+            "--photons",
+            "1000",
+        ]);
+        arguments.extend(more);
+        let output = ppm_vk(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(0), "{more:?}: {}", stderr(&output));
+        let image = ppm_vk::film::read_exr(&folder.path().join("o.exr")).expect("picture");
+        let defects = ppm_vk::metrics::defects(&image);
+        assert_eq!(defects, ppm_vk::metrics::Defects::default(), "{more:?}");
+        assert!(!stderr(&output).contains("NaN"), "{more:?}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn the_processor_renders_without_vulkan() {
+    let folder = TempDir::new().expect("folder");
+    let output = small_render(
+        folder.path(),
+        &scene("cornell.gltf"),
+        &["--backend", "cpu", "--profile"],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(
+        String::from_utf8_lossy(&output.stdout).contains("kd-tree"),
+        "the profile names the CPU's gather"
+    );
+    let conflict = small_render(
+        folder.path(),
+        &scene("cornell.gltf"),
+        &["--backend", "cpu", "--gather", "naive"],
+    );
+    assert_refused(&conflict, "--backend cpu");
 }
 
 #[test]

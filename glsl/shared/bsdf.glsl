@@ -40,6 +40,15 @@ Facing face(Surface surface, vec3 incoming) {
     return facing;
 }
 
+// The mirror direction. Off the shading normal it may point into the surface; then the geometric normal takes its place.
+vec3 mirror_direction(Facing facing, vec3 incoming) {
+    vec3 reflected = incoming - 2.0 * dot(incoming, facing.shading_normal) * facing.shading_normal;
+    if (dot(reflected, facing.geometric_normal) <= 0.0) {
+        reflected = incoming - 2.0 * dot(incoming, facing.geometric_normal) * facing.geometric_normal;
+    }
+    return normalize(reflected);
+}
+
 // What can happen at a dielectric boundary.
 struct Boundary {
     float reflectance;
@@ -55,7 +64,7 @@ Boundary meet_boundary(Facing facing, vec3 incoming, float ior) {
     float cos_i = -dot(incoming, n);
     float cos_t;
     boundary.reflectance = fresnel_dielectric(cos_i, boundary.eta, cos_t);
-    boundary.reflected = normalize(incoming + 2.0 * cos_i * n);
+    boundary.reflected = mirror_direction(facing, incoming);
     boundary.refracted = normalize(boundary.eta * incoming + (boundary.eta * cos_i - cos_t) * n);
     return boundary;
 }

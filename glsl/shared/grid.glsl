@@ -4,9 +4,6 @@
 // Set on the device for each iteration, from the radii that the visible points have then.
 struct GridShape {
     float inverse_cell_size;
-    float cell_size;
-    float mean_radius;
-    float largest_radius2;
 };
 
 ivec3 cell_of(vec3 position, float inverse_cell_size) {

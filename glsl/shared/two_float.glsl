@@ -16,7 +16,11 @@ void add_to(inout float high, inout float low, float value) {
     two_sum(sum, rest + low, high, low);
 }
 
-// Takes the fraction `part` off, for a part that may be far below the precision of an f32 next to 1.
-void reduce_by(inout float high, inout float low, float part) {
-    add_to(high, low, -(high * part) - low * part);
+// Multiplies by 1 − part; `rest` is 1 − part, computed apart. Whichever is small keeps its precision.
+void reduce_by(inout float high, inout float low, float part, float rest) {
+    if (part < 0.5) {
+        add_to(high, low, -(high * part) - low * part);
+    } else {
+        two_sum(high * rest, low * rest, high, low);
+    }
 }

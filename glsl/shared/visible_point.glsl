@@ -1,5 +1,4 @@
-// The paper's hitpoint: where a camera path met a matte surface. Two kinds of places need it: the stages that find it
-// and the gathers.
+// The paper's hitpoint: where a camera path met a matte surface.
 struct VisiblePoint {
     vec4 position_object; // xyz: render space; w: uint bits, object, NO_OBJECT where the path found no matte surface
     vec4 weight_normal;   // rgb: path throughput × BRDF (1/sr); w: uint bits, octahedral geometric normal on the
@@ -22,14 +21,6 @@ uvec2 pixel_of(uint pixel_slot) {
     uint inside = pixel_slot % (TILE * TILE);
     uvec2 local = uvec2((inside & 3u) | ((inside >> 1u) & 4u), ((inside >> 2u) & 1u) | ((inside >> 3u) & 6u));
     return uvec2(tile % tiles_across, tile / tiles_across) * TILE + local;
-}
-
-uint pixel_slot_of(uvec2 pixel) {
-    uint tiles_across = (settings.resolution.x + TILE - 1u) / TILE;
-    uint tile = (pixel.y / TILE) * tiles_across + pixel.x / TILE;
-    uvec2 local = pixel % TILE;
-    uint inside = (local.x & 3u) | ((local.y & 1u) << 2u) | ((local.x & 4u) << 1u) | ((local.y & 6u) << 3u);
-    return tile * TILE * TILE + inside;
 }
 
 uint pixel_slots() {

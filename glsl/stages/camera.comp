@@ -95,7 +95,7 @@ void main() {
                 if (material.surface == MIRROR) {
                     float cos_i = -dot(branch.direction, facing.shading_normal);
                     branch.throughput *= fresnel_schlick(material.base_color, cos_i);
-                    branch.direction = normalize(branch.direction + 2.0 * cos_i * facing.shading_normal);
+                    branch.direction = mirror_direction(facing, branch.direction);
                 } else {
                     Boundary boundary = meet_boundary(facing, branch.direction, material.ior);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.

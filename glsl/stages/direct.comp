@@ -57,6 +57,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     Hit hit = trace(origin, ray, by_bsdf ? 1e30 : 1.0, ignored, !by_bsdf);
     if (loops_cut) {
         atomicAdd(status.cut_paths, 1u);
+        return vec3(0.0);
     }
     if (by_bsdf == (hit.triangle == MISS)) {
         return vec3(0.0);

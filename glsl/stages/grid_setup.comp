@@ -18,8 +18,8 @@ layout(push_constant) uniform Push {
 layout(std430) writeonly buffer Grid { GridShape grid; };
 layout(std430) readonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
-// Below this, render units, cell coordinates would pass 2^30.
-const float SMALLEST_CELL = 1.0 / 536870912.0;
+// Render units. Positions resolve 6e-8: finer cells would gain nothing, and a visible point would reach too many of them.
+const float SMALLEST_CELL = 1.0 / 1048576.0;
 
 void main() {
     RadiusSum term = RadiusSum(0.0, 0.0, 0u, 0u);
@@ -34,6 +34,6 @@ void main() {
         float mean = all.radius / float(max(all.count, 1u));
         // The largest radius must not reach too many cells.
         float cell_size = max(max(2.0 * mean, sqrt(all.radius2) / 8.0), SMALLEST_CELL);
-        grid = GridShape(1.0 / cell_size, cell_size, mean, all.radius2);
+        grid.inverse_cell_size = 1.0 / cell_size;
     }
 }

@@ -135,7 +135,7 @@ void main() {
         } else if (material.surface == MIRROR) {
             float cos_i = -dot(incoming, facing.shading_normal);
             alive = survives(path.flux, path.flux * fresnel_schlick(material.base_color, cos_i), u.z);
-            path.direction = normalize(incoming + 2.0 * cos_i * facing.shading_normal);
+            path.direction = mirror_direction(facing, incoming);
             path.seen_directly = false;
         } else {
             Boundary boundary = meet_boundary(facing, incoming, material.ior);

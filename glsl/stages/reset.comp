@@ -12,15 +12,11 @@ layout(local_size_x = 64) in;
 
 layout(std430) writeonly buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) writeonly buffer GatheredOf { Gathered gathered[]; };
-layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
 void main() {
     uint slot = invocation_index();
     if (slot < slots()) {
         statistics[slot] = Statistics(settings.initial_radius2, 0.0, 0u, 0u, vec4(0.0), vec4(0.0));
         gathered[slot].flux_count = vec4(0.0);
-    }
-    if (gl_LocalInvocationID.x == 0u && slot < slots()) {
-        radius_sums[workgroup_index()] = RadiusSum(sqrt(settings.initial_radius2), settings.initial_radius2, 1u, 0u);
     }
 }

@@ -9,6 +9,7 @@ layout(local_size_x = 64) in;
 #include "sampling.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
+#include "status.glsl"
 
 layout(push_constant) uniform Push {
     uint iterations;
@@ -35,7 +36,13 @@ void main() {
         DirectSum sum = direct_sums[slot];
         // The quotient of flux and emitted photons comes first: both grow without bound, it doesn't.
         radiance += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
-        radiance += (mine.flux_high.rgb + mine.flux_low.rgb) / push.emitted / (PI * mine.radius2_high);
+        if (mine.radius2_high > 0.0) {
+            radiance += (mine.flux_high.rgb + mine.flux_low.rgb) / push.emitted / (PI * mine.radius2_high);
+        }
+    }
+    if (!finite(radiance)) {
+        atomicAdd(status.non_finite, 1u);
+        radiance = vec3(0.0);
     }
     film[pixel.y * settings.resolution.x + pixel.x] = vec4(radiance, 1.0);
 }

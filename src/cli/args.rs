@@ -1,6 +1,7 @@
 //! The arguments, as cli.md gives them to scripts.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -78,7 +79,7 @@ pub struct RenderArguments {
     pub iterations: Option<u32>,
     /// Stop after so many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub time: Option<f64>,
+    pub time: Option<Duration>,
     /// Photon paths emitted in an iteration.
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub photons: u32,
@@ -94,10 +95,9 @@ pub struct RenderArguments {
     /// Initial radius in scene units [default: from the photons' density, printed].
     #[arg(long, value_name = "R", value_parser = radius)]
     pub radius: Option<f64>,
-    /// How visible points find their photons (ppm-vk gathers lists the methods).
-    #[arg(long, value_name = "METHOD", default_value = gather::METHODS[gather::default_method()].name,
-          value_parser = gather_method)]
-    pub gather: usize,
+    /// How visible points find their photons (ppm-vk gathers lists the methods) [default: the fastest].
+    #[arg(long, value_name = "METHOD", value_parser = gather_method)]
+    pub gather: Option<usize>,
     /// How rays meet triangles.
     #[arg(long, value_enum, default_value_t = Accel::Bvh)]
     pub accel: Accel,
@@ -160,12 +160,11 @@ fn radius(text: &str) -> Result<f64, String> {
     }
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = number(text)?;
-    if seconds > 0.0 && seconds.is_finite() {
-        Ok(seconds)
-    } else {
-        Err("must be above 0".to_owned())
+fn seconds(text: &str) -> Result<Duration, String> {
+    match Duration::try_from_secs_f64(number(text)?) {
+        Ok(time) if !time.is_zero() => Ok(time),
+        Ok(_) => Err("must be above 0".to_owned()),
+        Err(error) => Err(error.to_string()),
     }
 }
 

@@ -1,17 +1,20 @@
 //! Renders a scene to files.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use clap::CommandFactory;
+use clap::error::ErrorKind;
 
-use super::args::{BackendChoice, RenderArguments};
+use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::progress::{Limits, Progress, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
 use crate::config::RenderConfig;
 use crate::film::{self, Metadata};
-use crate::gather::METHODS;
+use crate::gather::{self, METHODS};
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
 use crate::report::{Profile, Subject};
@@ -27,23 +30,29 @@ const DEFAULT_ITERATIONS: u32 = 64;
 /// The render command.
 pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let path = arguments.scene.as_deref().context("--scene is missing")?;
+    if arguments.backend == BackendChoice::Cpu && (arguments.device.is_some() || arguments.gather.is_some()) {
+        let text = "--backend cpu has no --device, and its own --gather (a kd-tree)";
+        Arguments::command().error(ErrorKind::ArgumentConflict, text).exit();
+    }
     let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
     // Before any work: nobody wants to learn after an hour that the picture can't be written.
-    for file in outputs(arguments, &output) {
+    let outputs: Vec<&Path> = outputs(arguments, &output).collect();
+    check_distinct(path, &outputs)?;
+    for file in outputs {
         film::check_writable(file)?;
     }
     interrupt::install()?;
 
     let scene = Scene::load(path)?;
     for warning in &scene.warnings {
-        eprintln!("warning: {warning}");
+        say!("warning: {warning}");
     }
     let camera = &scene.cameras[scene.camera_index(arguments.camera.as_deref())?];
     let config = config(arguments, camera);
     let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(path, what))?;
     let mut backend = open(arguments, &packed, camera, &config)?;
     if arguments.radius.is_none() {
-        eprintln!(
+        say!(
             "initial radius {:.6} scene units (automatic)",
             f64::from(backend.radius()) / packed.scale
         );
@@ -54,13 +63,18 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         iterations: arguments
             .iterations
             .or(arguments.time.is_none().then_some(DEFAULT_ITERATIONS)),
-        time: arguments.time.map(Duration::from_secs_f64),
+        time: arguments.time,
     };
     let progress = Progress::new(limits, arguments.quiet);
     let mut profile = Profile::default();
+    let profiled = arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some();
     while limits.done(backend.iterations(), start.elapsed()) < 1.0 && !(interrupt::asked() && backend.iterations() > 0)
     {
-        profile.add(backend.iterate()?);
+        let run = backend.iterate()?;
+        // A day's launches are gigabytes.
+        if profiled {
+            profile.add(run);
+        }
         progress.show(backend.as_ref());
     }
     let seconds = start.elapsed().as_secs_f64();
@@ -80,9 +94,9 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         film::write_png(&image, png, arguments.exposure)?;
     }
     for warning in backend.counters().warnings(backend.emitted(), config.max_depth) {
-        eprintln!("warning: {warning}");
+        say!("warning: {warning}");
     }
-    eprintln!(
+    say!(
         "{}: {}x{}, {} iterations, {} photon paths, {seconds:.1} s ({} photon paths/s) on {}",
         output.display(),
         image.width(),
@@ -95,7 +109,10 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let subject = Subject {
         scene: scene.name.clone(),
         resolution: config.resolution,
-        gather: METHODS[config.gather].name.to_owned(),
+        gather: match arguments.backend {
+            BackendChoice::Vulkan => METHODS[config.gather].name.to_owned(),
+            BackendChoice::Cpu => "kd-tree".to_owned(),
+        },
         photons: config.photons,
         device: backend.device(),
         counters: backend.counters(),
@@ -134,15 +151,38 @@ fn config(arguments: &RenderArguments, camera: &Camera) -> RenderConfig {
         direct: arguments.direct,
         alpha: arguments.alpha,
         radius: arguments.radius,
-        gather: arguments.gather,
+        gather: arguments.gather.unwrap_or_else(gather::default_method),
         accel: arguments.accel,
         max_depth: arguments.max_depth,
         seed: arguments.seed,
     }
 }
 
+/// The scene's name with `.exr`, in the current folder.
 fn default_output(scene: &Path) -> PathBuf {
-    PathBuf::from(scene.file_stem().unwrap_or(scene.as_os_str())).with_extension("exr")
+    let mut name = scene.file_stem().unwrap_or(scene.as_os_str()).to_owned();
+    name.push(".exr");
+    PathBuf::from(name)
+}
+
+/// Fails if two outputs, or an output and the scene, are one file.
+fn check_distinct(scene: &Path, outputs: &[&Path]) -> Result<()> {
+    let place = |path: &Path| {
+        path.canonicalize()
+            .or_else(|_| std::path::absolute(path))
+            .unwrap_or(path.to_owned())
+    };
+    let mut taken = vec![place(scene)];
+    for output in outputs {
+        let file = place(output);
+        ensure!(
+            !taken.contains(&file),
+            "{}: would overwrite the scene or another output; name another",
+            output.display()
+        );
+        taken.push(file);
+    }
+    Ok(())
 }
 
 fn outputs<'a>(arguments: &'a RenderArguments, output: &'a Path) -> impl Iterator<Item = &'a Path> {

@@ -30,7 +30,9 @@ pub fn resolve(
             let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
             let tau = from_two_floats(statistics.flux_high, statistics.flux_low);
             radiance += from_two_floats(direct.high, direct.low) / f64::from(iterations);
-            radiance += tau / (PI * radius2 * emitted as f64);
+            if radius2 > 0.0 {
+                radiance += tau / (PI * radius2 * emitted as f64);
+            }
         }
         film[y as usize * width + x as usize] = with_word(radiance, 1.0f32.to_bits());
     }

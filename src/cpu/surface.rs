@@ -101,7 +101,13 @@ impl Facing {
 
     /// The incoming direction, mirrored.
     pub fn reflect(&self, incoming: DVec3) -> DVec3 {
-        (incoming - 2.0 * incoming.dot(self.shading_normal) * self.shading_normal).normalize()
+        let about = |n: DVec3| incoming - 2.0 * incoming.dot(n) * n;
+        let reflected = about(self.shading_normal);
+        if reflected.dot(self.geometric_normal) > 0.0 {
+            reflected.normalize()
+        } else {
+            about(self.geometric_normal).normalize()
+        }
     }
 
     /// Where a ray starts that leaves `position` in `direction`: on the side that it flies to.

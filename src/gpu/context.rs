@@ -10,6 +10,7 @@ use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::shaders;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 const API_VERSION: u32 = vk::API_VERSION_1_2;
@@ -61,6 +62,8 @@ pub(super) type Messages = Arc<Mutex<Vec<String>>>;
 pub(super) struct Instance {
     _entry: ash::Entry, // keeps the loader
     pub handle: ash::Instance,
+    /// Whether objects and passes can be named.
+    labels: bool,
     debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     pub messages: Messages,
 }
@@ -177,6 +180,7 @@ impl Instance {
             Ok(Self {
                 _entry: entry,
                 handle,
+                labels: debug_utils,
                 debug,
                 messages,
             })
@@ -214,8 +218,17 @@ impl Instance {
             Some((_, 0)) => lacks.push("timestamps on its compute queue".to_owned()),
             Some(_) => {}
         }
-        if limits.max_compute_shared_memory_size < 16384 {
-            lacks.push("16 KiB of shared memory".to_owned());
+        let buffers = shaders::ALL
+            .iter()
+            .map(|shader| shader.storage_buffers())
+            .max()
+            .unwrap_or(0) as u32;
+        if limits.max_per_stage_descriptor_storage_buffers < buffers {
+            lacks.push(format!("{buffers} storage buffers a stage"));
+        }
+        let threads = shaders::ALL.iter().map(|shader| shader.workgroup).max().unwrap_or(0);
+        if limits.max_compute_work_group_invocations < threads || limits.max_compute_work_group_size[0] < threads {
+            lacks.push(format!("workgroups of {threads} invocations"));
         }
         let version = |v: u32| {
             format!(
@@ -313,8 +326,7 @@ impl Context {
                 .or_vulkan("vkCreateDevice")?;
             let queue = device.get_device_queue(family, 0);
             let debug = instance
-                .debug
-                .is_some()
+                .labels
                 .then(|| ext::debug_utils::Device::new(&instance.handle, &device));
             let allocator = Allocator::new(&AllocatorCreateDesc {
                 instance: instance.handle.clone(),

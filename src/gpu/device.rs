@@ -158,11 +158,6 @@ impl Device {
     pub fn size(&self, id: BufferId) -> u64 {
         self.buffers.get(&id).map_or(0, |buffer| buffer.bytes)
     }
-
-    /// Bytes of all buffers.
-    pub fn memory(&self) -> u64 {
-        self.buffers.values().map(|buffer| buffer.bytes).sum()
-    }
 }
 
 fn choose(

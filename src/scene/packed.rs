@@ -178,14 +178,3 @@ pub fn encode_direction(direction: Vec3) -> u32 {
     let quantise = |value: f32| u32::from((value.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);
     quantise(x) | quantise(y) << 16
 }
-
-/// The inverse of [`encode_direction`].
-pub fn decode_direction(code: u32) -> Vec3 {
-    let value = |bits: u32| f32::from(bits as u16 as i16).max(-32767.0) / 32767.0;
-    let (mut x, mut y) = (value(code), value(code >> 16));
-    let z = 1.0 - x.abs() - y.abs();
-    if z < 0.0 {
-        (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
-    }
-    Vec3::new(x, y, z).normalize()
-}

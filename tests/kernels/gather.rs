@@ -55,11 +55,9 @@ fn assert_methods_agree(
     bench.upload(BufferId::VisiblePoints, points);
     bench.upload(BufferId::Photons, photons);
     bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);
-    let radius_sums = cpu::radius_sums(points, statistics, shaders::UPDATE.workgroup as usize);
     for method in METHODS {
         let what = format!("{case}, {}", method.name);
         bench.upload(BufferId::StatisticsOf, statistics);
-        bench.upload(BufferId::RadiusSums, &radius_sums);
         let found = gather(bench, method, &what);
         assert_same_photons(&what, &found, &expected);
 

@@ -164,12 +164,15 @@ fn radii_shrink_where_more_photons_than_wanted_were_found() {
 }
 
 #[test]
-fn updates_sum_up_the_radii_and_clear_what_was_gathered() {
+fn radii_are_summed_up_and_updates_clear_what_was_gathered() {
     let mut bench = Bench::new("cornell-spheres", small());
     let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
     let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+    let mut recording = Recording::new();
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, points.len() as u32));
+    bench.renderer.gpu().run(&recording).expect("radii");
     let found: Vec<RadiusSum> = bench.download(BufferId::RadiusSums);
-    let expected = cpu::radius_sums(&points, &statistics, shaders::UPDATE.workgroup as usize);
+    let expected = cpu::radius_sums(&points, &statistics, shaders::GRID_RADII.workgroup as usize);
     assert_eq!(found.len(), expected.len());
     for (group, (found, expected)) in found.iter().zip(&expected).enumerate() {
         assert_eq!(
