@@ -175,10 +175,10 @@ fn ctrl_c_writes_the_picture_and_exits_with_130() {
     let mut stderr = std::io::BufReader::new(child.stderr.take().expect("stderr"));
     std::io::BufRead::read_line(&mut stderr, &mut String::new()).expect("a line");
     std::thread::sleep(std::time::Duration::from_millis(500));
-    let kill = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
+    let kill = Command::new("sh")
+        .args(["-c", &format!("kill -INT {}", child.id())])
         .status()
-        .expect("kill");
+        .expect("sh");
     assert!(kill.success());
     let status = child.wait().expect("exit");
     assert_eq!(status.code(), Some(130));
