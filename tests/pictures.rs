@@ -308,3 +308,12 @@ fn photons_that_do_not_fit_make_room_and_lose_nothing() {
     );
     assert_eq!(defects(&image), Defects::default());
 }
+
+#[test]
+fn debug_builds_run_under_the_validation_layer() {
+    let device = Device::open(None).expect("a Vulkan device");
+    assert!(
+        device.is_validated() || !cfg!(debug_assertions),
+        "VK_LAYER_KHRONOS_validation isn't installed: these tests would miss what it says (scripts/setup installs it)"
+    );
+}

@@ -187,6 +187,11 @@ impl Instance {
         }
     }
 
+    /// Whether the validation layer is on.
+    pub fn is_validated(&self) -> bool {
+        self.debug.is_some()
+    }
+
     /// Every device, usable or not.
     pub fn devices(&self) -> Result<Vec<(vk::PhysicalDevice, DeviceSummary)>> {
         // SAFETY: the instance is live.

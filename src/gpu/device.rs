@@ -48,14 +48,7 @@ impl Device {
         let instance = Instance::shared()?;
         let devices = instance.devices()?;
         let (physical, summary) = choose(devices, choice)?;
-        if !summary.lacks.is_empty() {
-            return Err(Error::Device(format!(
-                "device {} ({}) lacks {}; pick another with --device (ppm-vk devices lists them) or use --backend cpu",
-                summary.index,
-                summary.name,
-                summary.lacks.join(", ")
-            )));
-        }
+        check_usable(&summary)?;
         let context = Context::new(instance, physical)?;
         // SAFETY: plain creation calls; Drop destroys what they make before the context goes.
         let (pool, commands, fence) = unsafe {
@@ -98,6 +91,11 @@ impl Device {
     /// Name, driver, limits.
     pub fn summary(&self) -> &DeviceSummary {
         &self.summary
+    }
+
+    /// Whether the validation layer watches: in debug builds, where it is installed.
+    pub fn is_validated(&self) -> bool {
+        self.context.instance.is_validated()
     }
 
     /// Loop iterations after which the driver ends all loops of an invocation, as measured when the device was
@@ -160,6 +158,18 @@ impl Device {
     }
 }
 
+fn check_usable(summary: &DeviceSummary) -> Result<()> {
+    if summary.lacks.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Device(format!(
+        "device {} ({}) lacks {}; pick another with --device (ppm-vk devices lists them) or use --backend cpu",
+        summary.index,
+        summary.name,
+        summary.lacks.join(", ")
+    )))
+}
+
 fn choose(
     mut devices: Vec<(vk::PhysicalDevice, DeviceSummary)>,
     choice: Option<&str>,
@@ -212,5 +222,70 @@ impl Drop for Device {
         for (_, buffer) in self.buffers.drain().chain(self.read_back.drain()) {
             buffer.free(&self.context);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(index: usize, name: &str, kind: &'static str, lacks: &[&str]) -> (vk::PhysicalDevice, DeviceSummary) {
+        let summary = DeviceSummary {
+            index,
+            name: name.to_owned(),
+            driver: String::new(),
+            kind,
+            api_version: "1.2.0".to_owned(),
+            timestamp_period_ns: 1.0,
+            subgroup_size: 32,
+            max_storage_buffer_bytes: 1 << 27,
+            max_texels: 1 << 16,
+            max_shared_memory_bytes: 1 << 14,
+            lacks: lacks.iter().map(|&what| what.to_owned()).collect(),
+        };
+        (vk::PhysicalDevice::null(), summary)
+    }
+
+    fn three() -> Vec<(vk::PhysicalDevice, DeviceSummary)> {
+        vec![
+            device(0, "llvmpipe", "cpu", &[]),
+            device(1, "Old Card", "discrete", &["Vulkan 1.2"]),
+            device(2, "Small Card", "integrated", &[]),
+        ]
+    }
+
+    fn chosen(choice: Option<&str>) -> Result<usize> {
+        choose(three(), choice).map(|(_, summary)| summary.index)
+    }
+
+    #[test]
+    fn the_best_device_that_lacks_nothing_is_chosen() {
+        assert_eq!(chosen(None).ok(), Some(2));
+    }
+
+    #[test]
+    fn a_device_is_found_by_index_and_by_a_part_of_its_name() {
+        assert_eq!(chosen(Some("0")).ok(), Some(0));
+        assert_eq!(chosen(Some("old card")).ok(), Some(1));
+    }
+
+    #[test]
+    fn a_device_that_is_not_there_is_told_from_those_that_are() {
+        let error = chosen(Some("9")).expect_err("no such device").to_string();
+        assert!(
+            error.contains("--device 9") && error.contains("2: Small Card"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_device_that_lacks_something_is_refused_with_what_it_lacks() {
+        let (_, old) = &three()[1];
+        let error = check_usable(old).expect_err("it lacks Vulkan 1.2").to_string();
+        assert!(
+            error.contains("Old Card") && error.contains("lacks Vulkan 1.2"),
+            "{error}"
+        );
+        assert!(error.contains("--backend cpu") && !error.contains('\n'), "{error}");
     }
 }
