@@ -69,6 +69,23 @@ impl Receiver {
     }
 }
 
+/// Adds to each slot what `gather` sums up for its receiver.
+fn for_each_receiver(
+    visible_points: &[VisiblePoint],
+    statistics: &[Statistics],
+    gathered: &mut [Gathered],
+    gather: impl Fn(&Receiver, &mut Sum) + Sync,
+) {
+    let slots = gathered.par_iter_mut().zip(visible_points).zip(statistics);
+    slots.for_each(|((gathered, point), statistics)| {
+        if let Some(receiver) = Receiver::new(point, statistics) {
+            let mut sum = Sum::default();
+            gather(&receiver, &mut sum);
+            sum.add_to(gathered);
+        }
+    });
+}
+
 /// Adds to each slot the photons that it accepts, by testing every photon.
 pub fn gather_naive(
     visible_points: &[VisiblePoint],
@@ -76,20 +93,10 @@ pub fn gather_naive(
     photons: &[Photon],
     gathered: &mut [Gathered],
 ) {
-    gathered
-        .par_iter_mut()
-        .zip(visible_points)
-        .zip(statistics)
-        .for_each(|((gathered, point), statistics)| {
-            if let Some(receiver) = Receiver::new(point, statistics) {
-                let mut sum = Sum::default();
-                photons
-                    .iter()
-                    .filter(|photon| receiver.accepts(photon))
-                    .for_each(|photon| sum.add(photon));
-                sum.add_to(gathered);
-            }
-        });
+    for_each_receiver(visible_points, statistics, gathered, |receiver, sum| {
+        let accepted = photons.iter().filter(|photon| receiver.accepts(photon));
+        accepted.for_each(|photon| sum.add(photon));
+    });
 }
 
 /// Adds to each slot the photons that it accepts, by asking a kd-tree for those nearby: the paper's CPU version.
@@ -108,25 +115,16 @@ pub fn gather_kd_tree(
     let positions: Vec<[f32; 3]> = photons.iter().map(|photon| position(photon.position_object)).collect();
     let tree = ImmutableKdTree::new_from_slice(&positions)
         .map_err(|error| Error::Config(format!("kd-tree: {error}; try fewer --photons")))?;
-    gathered
-        .par_iter_mut()
-        .zip(visible_points)
-        .zip(statistics)
-        .for_each(|((gathered, point), statistics)| {
-            if let Some(receiver) = Receiver::new(point, statistics) {
-                let mut sum = Sum::default();
-                let near = receiver.radius2 * MARGIN;
-                tree.query(&receiver.position)
-                    .within::<SquaredEuclidean<f32>>(near)
-                    .unsorted()
-                    .visit(|found| {
-                        let photon = &photons[found.item as usize];
-                        if receiver.accepts(photon) {
-                            sum.add(photon);
-                        }
-                    });
-                sum.add_to(gathered);
-            }
-        });
+    for_each_receiver(visible_points, statistics, gathered, |receiver, sum| {
+        tree.query(&receiver.position)
+            .within::<SquaredEuclidean<f32>>(receiver.radius2 * MARGIN)
+            .unsorted()
+            .visit(|found| {
+                let photon = &photons[found.item as usize];
+                if receiver.accepts(photon) {
+                    sum.add(photon);
+                }
+            });
+    });
     Ok(())
 }
