@@ -23,10 +23,17 @@ pub struct Stages<'a> {
     pub sizes: &'a Sizes,
 }
 
+/// A recording whose stages report into a status of their own.
+fn reporting() -> Recording {
+    let mut recording = Recording::new();
+    recording.fill(BufferId::Status, 0);
+    recording
+}
+
 impl Stages<'_> {
     /// The commands of an iteration.
     pub fn iteration(&self, iteration: u32) -> Recording {
-        let mut recording = Recording::new();
+        let mut recording = reporting();
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
             self.camera(iteration, &mut recording);
         }
@@ -145,7 +152,7 @@ impl Renderer {
             let run = self.device.run(&record(self.stages()))?;
             all.launches.extend(run.launches);
             all.wall += run.wall;
-            let status = self.take_status()?;
+            let status = self.status()?;
             if status.again == 0 {
                 return Ok((all, status));
             }
@@ -179,20 +186,13 @@ impl Renderer {
         self.device.run(&recording).map(|_| ())
     }
 
-    /// What was reported since the last call.
-    fn take_status(&mut self) -> Result<StatusCounters> {
+    /// What the last recording that began with [`reporting`] reported.
+    fn status(&mut self) -> Result<StatusCounters> {
         let status: Vec<StatusCounters> = self.device.download(BufferId::Status, Some(1))?;
-        self.clear_status()?;
         status
             .first()
             .copied()
             .ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
-    }
-
-    fn clear_status(&mut self) -> Result<()> {
-        let mut recording = Recording::new();
-        recording.fill(BufferId::Status, 0);
-        self.device.run(&recording).map(|_| ())
     }
 
     /// The buffers' sizes.
@@ -265,9 +265,8 @@ impl Renderer {
         if self.config.radius.is_some() {
             return self.reset();
         }
-        self.clear_status()?;
         self.run_until_it_fits(|stages| {
-            let mut recording = Recording::new();
+            let mut recording = reporting();
             stages.camera(0, &mut recording);
             stages.photons(radius::PILOT, 0, &mut recording);
             recording
@@ -283,7 +282,7 @@ impl Renderer {
         self.reset()?;
         for _ in 0..radius::FITS {
             self.run_until_it_fits(|stages| {
-                let mut recording = Recording::new();
+                let mut recording = reporting();
                 (METHODS[stages.config.gather].record)(stages.sizes, &mut recording);
                 recording
             })?;
@@ -297,8 +296,7 @@ impl Renderer {
     }
 
     fn reset(&mut self) -> Result<()> {
-        let mut recording = Recording::new();
-        recording.fill(BufferId::Status, 0);
+        let mut recording = reporting();
         recording.fill(BufferId::DirectSums, 0);
         recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.slots()));
         self.device.run(&recording).map(|_| ())
@@ -320,11 +318,11 @@ impl Backend for Renderer {
     }
 
     fn resolve(&mut self) -> Result<Image> {
-        let mut recording = Recording::new();
+        let mut recording = reporting();
         let push = [self.iterations.max(1), (self.emitted.max(1) as f32).to_bits()];
         recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
         self.device.run(&recording)?;
-        self.counters.non_finite += u64::from(self.take_status()?.non_finite);
+        self.counters.non_finite += u64::from(self.status()?.non_finite);
         let [width, height] = self.config.resolution.map(|side| side as usize);
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
         Ok(Image::new(

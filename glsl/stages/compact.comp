@@ -20,23 +20,17 @@ layout(std430) writeonly buffer Photons { Photon photons[]; };
 void main() {
     uint i = invocation_index();
     if (i == 0u) {
-        photon_count = min(scan_total, settings.photon_capacity);
-        if (scan_total > settings.photon_capacity) {
-            atomicOr(status.again, PHOTONS_DID_NOT_FIT);
-        }
+        photon_count = scan_total; // within the capacity, since no lane keeps more than its share
         uint before = status.photons_stored_low;
         status.photons_stored_low = before + scan_total;
         status.photons_stored_high += before + scan_total < before ? 1u : 0u;
     }
-    if (i >= settings.photon_lanes * settings.lane_capacity) {
+    if (i >= settings.photon_capacity) {
         return;
     }
     uint lane = i % settings.photon_lanes;
     uint number = i / settings.photon_lanes;
     if (number < lane_counts[lane]) {
-        uint target = lane_offsets[lane] + number;
-        if (target < settings.photon_capacity) {
-            photons[target] = PHOTON(LanePhotons, i);
-        }
+        photons[lane_offsets[lane] + number] = PHOTON(LanePhotons, i);
     }
 }

@@ -7,7 +7,6 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "texel.glsl"
-#include "sampling.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
 #include "two_float.glsl"
