@@ -53,6 +53,10 @@ pub struct Counters {
     pub cut_paths: u64,
     /// Values that were NaN or infinite and were left out.
     pub non_finite: u64,
+    /// Photons beyond the maximum of a grid cell, which weren't gathered.
+    pub lost_photons: u64,
+    /// Grid cells that had more photons than their maximum, in all iterations.
+    pub full_cells: u64,
     /// Iterations done again because photons didn't fit.
     pub repeated_iterations: u64,
 }
@@ -72,6 +76,12 @@ impl Counters {
             warnings.push(format!(
                 "{} paths were ended by the driver's loop limit; their light is missing: use another --device",
                 self.cut_paths
+            ));
+        }
+        if self.lost_photons > 0 {
+            warnings.push(format!(
+                "{} of {} photons were beyond --cell-photons in {} grid cells; their light is missing",
+                self.lost_photons, self.photons_stored, self.full_cells
             ));
         }
         if self.non_finite > 0 {

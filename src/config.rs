@@ -1,7 +1,8 @@
 //! What the user asked for, and every buffer size and group count that follows from it.
 
 use crate::error::{Error, Result};
-use crate::layout::{Photon, VisiblePoint};
+use crate::layout::{DirectSum, Gathered, GridShape, Photon, RadiusSum, Statistics, StatusCounters, VisiblePoint};
+use crate::stage::BufferId;
 
 /// Which visible points an iteration uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -45,8 +46,11 @@ pub struct RenderConfig {
     pub alpha: f32,
     /// Initial radius in scene units; automatic if `None`.
     pub radius: Option<f64>,
-    /// Index into [`crate::gather::METHODS`].
-    pub gather: usize,
+    /// Index into [`crate::gather::METHODS`]; the fastest of what renders if `None`.
+    pub gather: Option<usize>,
+    /// Photons that a cell of the method `cluster-grid` holds at the most; what is beyond is lost. Without it cells hold
+    /// all.
+    pub cell_photons: Option<u32>,
     /// How rays meet triangles.
     pub accel: Accel,
     /// Bounces of a path at the most.
@@ -64,7 +68,8 @@ impl Default for RenderConfig {
             direct: Direct::Light,
             alpha: 2.0 / 3.0,
             radius: None,
-            gather: crate::gather::default_method(),
+            gather: None,
+            cell_photons: None,
             accel: Accel::Bvh,
             max_depth: 64,
             seed: 0,
@@ -103,6 +108,11 @@ impl RenderConfig {
                 "--photons 0: at least one photon path is needed".to_owned(),
             ));
         }
+        if self.cell_photons == Some(0) {
+            return Err(Error::Config(
+                "--cell-photons 0: a cell has to hold at least one photon".to_owned(),
+            ));
+        }
         if self.max_depth == 0 {
             return Err(Error::Config("--max-depth 0: at least one bounce is needed".to_owned()));
         }
@@ -114,8 +124,20 @@ impl RenderConfig {
 pub const TILE: u32 = 8;
 /// Visible points of a pixel at the most, where they are found once: glass splits the path while a slot is free.
 pub const PPM_SLOTS: u32 = 8;
-/// Photons that one dispatch of the naive gather tests at the most, below every known driver's loop limit.
-pub const NAIVE_RANGE: u32 = 16_000;
+/// Photons that one launch of a gather that tests every photon looks at, below every known driver's loop limit.
+pub const EXHAUSTIVE_RANGE: u32 = 16_000;
+/// Visible points of a workgroup of the paper's orders: the workgroup size of `gather_*.comp`, `RUN` of `clusters.glsl`.
+pub const GROUP: u32 = 64;
+/// What an order of visible points has at a filler's place.
+pub const NO_SLOT: u32 = u32::MAX;
+/// Bits of a key along the space-filling curve of `point_curve.comp`.
+pub const CURVE_BITS: u32 = 18;
+/// Rounds of Lloyd's algorithm for the k-means clusters.
+pub const LLOYD_ROUNDS: u32 = 4;
+/// Visible points that an invocation of `gather_clustered.comp` has.
+pub const CLUSTERED_RUN: u32 = 8;
+/// Workgroups that sum up the radii.
+pub const RADIUS_GROUPS: u32 = 256;
 /// Numbers of a block of the prefix sum.
 pub const SCAN_BLOCK: u32 = 2048;
 /// Keys of a tile of the radix sort.
@@ -126,6 +148,8 @@ pub const SORT_DIGIT_BITS: u32 = 4;
 /// Sizes of a render's buffers, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sizes {
+    /// Pixels, width and height.
+    pub resolution: [u32; 2],
     /// Slots for pixels: whole tiles.
     pub pixel_slots: u32,
     /// Visible points a pixel.
@@ -140,6 +164,32 @@ pub struct Sizes {
     pub cell_bits: u32,
     /// Launches among which a gather's photons are dealt: 1 unless the driver cuts its loops.
     pub gather_parts: u32,
+    /// The scene's objects.
+    pub meshes: u32,
+    /// Cells of all objects' grids.
+    pub object_cells: u32,
+    /// Photons of such a cell at the most.
+    pub cell_photons: Option<u32>,
+    /// What a bench asks of the gathers.
+    pub probe: Probe,
+}
+
+/// What a bench asks of the gathers besides gathering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Probe {
+    /// Gathers that test every photon do so for every stride-th workgroup of visible points.
+    pub stride: u32,
+    /// Whether the photons tested are counted.
+    pub count_tests: bool,
+}
+
+impl Default for Probe {
+    fn default() -> Self {
+        Self {
+            stride: 1,
+            count_tests: false,
+        }
+    }
 }
 
 /// What of a device and a scene the sizes depend on.
@@ -153,6 +203,10 @@ pub struct Limits {
     pub lanes: u32,
     /// Whether the scene has surfaces at which a path splits in two.
     pub glass: bool,
+    /// The scene's objects.
+    pub meshes: u32,
+    /// Cells of all objects' grids.
+    pub object_cells: u32,
 }
 
 /// Photons that a path leaves behind on average; more are noticed and make the buffers grow.
@@ -174,13 +228,18 @@ impl Sizes {
             .min((f64::from(photons_at_most) / (2.0 * EXPECTED_PHOTONS)) as u32)
             .max(1);
         let mut sizes = Self {
+            resolution: config.resolution,
             pixel_slots,
             slots_per_pixel,
             batch_paths,
             photon_lanes: 0,
             lane_capacity: 0,
             gather_parts: 1,
-            cell_bits: (batch_paths.ilog2() + 1).clamp(8, 24) / (2 * SORT_DIGIT_BITS) * (2 * SORT_DIGIT_BITS),
+            cell_bits: (batch_paths.ilog2() + 4).clamp(12, 24),
+            meshes: limits.meshes,
+            object_cells: limits.object_cells,
+            cell_photons: config.cell_photons,
+            probe: Probe::default(),
         };
         sizes.set_lanes(limits.lanes);
         sizes
@@ -210,6 +269,62 @@ impl Sizes {
     /// Photon paths that an invocation follows one after the other, at the most.
     pub fn paths_per_lane(&self) -> u32 {
         self.batch_paths.div_ceil(self.photon_lanes)
+    }
+
+    /// Bytes of the buffer `id`; `None` for those that hold the scene.
+    pub fn bytes(&self, id: BufferId) -> Option<u64> {
+        let pixels = u64::from(self.resolution[0]) * u64::from(self.resolution[1]);
+        let slots = u64::from(self.slots());
+        let photons = u64::from(self.photon_lanes) * u64::from(self.lane_capacity);
+        let lanes = u64::from(self.photon_lanes);
+        let tiles = photons.max(slots).div_ceil(u64::from(SORT_TILE));
+        let histograms = tiles << SORT_DIGIT_BITS;
+        let cells = (1u64 << self.cell_bits) + 1;
+        let (meshes, object_cells) = (u64::from(self.meshes), u64::from(self.object_cells) + 1);
+        let runs = u64::from(self.runs());
+        let scanned = [histograms, lanes, cells, meshes, object_cells, runs];
+        let scan_blocks = scanned.map(|count| count.div_ceil(u64::from(SCAN_BLOCK)));
+        let (count, size) = match id {
+            BufferId::VisiblePoints => (slots, size_of::<VisiblePoint>()),
+            BufferId::StatisticsOf => (slots, size_of::<Statistics>()),
+            BufferId::GatheredOf => (slots, size_of::<Gathered>()),
+            BufferId::DirectSums => (slots, size_of::<DirectSum>()),
+            BufferId::TestsOf => (if self.probe.count_tests { slots } else { 1 }, 4),
+            BufferId::RadiusSums => (u64::from(RADIUS_GROUPS), size_of::<RadiusSum>()),
+            BufferId::Film => (pixels, 16),
+            BufferId::Status => (1, size_of::<StatusCounters>()),
+            BufferId::Grid => (1, size_of::<GridShape>()),
+            BufferId::PhotonCount | BufferId::PointCount | BufferId::ScanTotal => (1, 4),
+            BufferId::LanePhotons | BufferId::Photons | BufferId::SortedPhotons => (photons, size_of::<Photon>()),
+            BufferId::LaneCounts | BufferId::LaneOffsets => (lanes, 4),
+            BufferId::Keys | BufferId::Values | BufferId::OtherKeys | BufferId::OtherValues => (photons, 4),
+            BufferId::PointKeys | BufferId::PointValues | BufferId::OtherPointKeys | BufferId::OtherPointValues => {
+                (slots, 4)
+            }
+            BufferId::Histograms => (histograms, 4),
+            BufferId::ScanSums => (scan_blocks.into_iter().max().unwrap_or(1), 4),
+            // Whole texels of four.
+            BufferId::CellStarts => (cells.next_multiple_of(4), 4),
+            BufferId::MeshEnds | BufferId::MeshFillers => (meshes, 4),
+            BufferId::ObjectCells | BufferId::ObjectCellCursors => (object_cells, 4),
+            BufferId::MeshOrder | BufferId::ClusterOf => (runs * u64::from(GROUP), 4),
+            BufferId::PointOrder => (u64::from(self.order_groups()) * u64::from(GROUP), 4),
+            BufferId::Centroids => (runs, 16),
+            BufferId::ClusterSizes | BufferId::ClusterStarts => (runs, 4),
+            _ => return None,
+        };
+        Some(count * size as u64)
+    }
+
+    /// Workgroups of visible points of one mesh each, at the most.
+    pub fn runs(&self) -> u32 {
+        // Every mesh's last one may be nearly empty.
+        self.slots().div_ceil(GROUP) + self.meshes.min(self.slots())
+    }
+
+    /// Workgroups of visible points of one cluster each, at the most.
+    pub fn order_groups(&self) -> u32 {
+        self.slots().div_ceil(GROUP) + self.runs()
     }
 
     /// Visible points.

@@ -204,16 +204,16 @@ device_structs! {
         pub low: [f32; 4],
     }
 
-    /// The radii of a workgroup's visible points.
+    /// Sums over visible points' radii.
     pub struct RadiusSum: 16 {
-        /// Σ R.
-        pub radius: f32,
-        /// The largest R².
+        /// Σ R².
         pub radius2: f32,
+        /// Σ 1/R².
+        pub inverse2: f32,
+        /// The largest R².
+        pub largest2: f32,
         /// Visible points.
         pub count: u32,
-        /// Zero.
-        pub padding: u32,
     }
 
     /// The hashed grid of an iteration.
@@ -222,20 +222,20 @@ device_structs! {
         pub inverse_cell_size: f32,
     }
 
-    /// A grid bucket's photons in the sorted order.
-    pub struct CellRange: 16 {
-        /// The first.
-        pub first: u32,
-        /// One past the last; 0 for an empty bucket.
-        pub end: u32,
-        /// Zero.
-        pub padding0: u32,
-        /// Zero.
-        pub padding1: u32,
+    /// A grid of cubes for an object. The scene's.
+    pub struct ObjectGrid: 32 {
+        /// Corner of the object's bounding box, render units.
+        pub low: [f32; 3],
+        /// 1 / side of a cube.
+        pub inverse_cell: f32,
+        /// Cubes along each axis.
+        pub cells: [u32; 3],
+        /// Cubes of the objects before.
+        pub first_cell: u32,
     }
 
     /// What the stages report to the host.
-    pub struct StatusCounters: 28 {
+    pub struct StatusCounters: 36 {
         /// Most photons that one lane had to store.
         pub lane_need: u32,
         /// Paths ended by the bounce limit.
@@ -250,5 +250,9 @@ device_structs! {
         pub photons_stored_low: u32,
         /// High word.
         pub photons_stored_high: u32,
+        /// Photons beyond the maximum that a user set for a grid cell.
+        pub lost_photons: u32,
+        /// Grid cells that had more than that maximum.
+        pub full_cells: u32,
     }
 }

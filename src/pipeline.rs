@@ -1,13 +1,13 @@
 //! The order of the stages in one iteration, on a Vulkan device. [`Stages::iteration`] reads like figure 1 of the paper.
 
 use crate::backend::{Backend, Counters, DeviceDescription, settings};
-use crate::config::{Accel, Direct, Estimator, Limits, RenderConfig, Sizes};
+use crate::config::{Accel, Direct, Estimator, Limits, Probe, RenderConfig, Sizes};
 use crate::error::{Error, Result};
 use crate::film::Image;
-use crate::gather::{METHODS, scan};
+use crate::gather::{METHODS, Record, default_method, scan};
 use crate::gpu::Device;
 use crate::layout::{
-    CellRange, GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Photon, Settings, StatusCounters, VisiblePoint,
+    GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Photon, Settings, StatusCounters, VisiblePoint,
 };
 use crate::record::{Recording, Run};
 use crate::scene::{Camera, PackedScene};
@@ -23,6 +23,12 @@ pub struct Stages<'a> {
     pub sizes: &'a Sizes,
 }
 
+/// The stages of a gather method that [`Renderer::new`] has let pass.
+fn method_stages(method: usize) -> (Record, Record) {
+    let nothing: Record = |_, _| ();
+    METHODS[method].stages().unwrap_or((nothing, nothing))
+}
+
 /// A recording whose stages report into a status of their own.
 fn reporting() -> Recording {
     let mut recording = Recording::new();
@@ -34,16 +40,31 @@ impl Stages<'_> {
     /// The commands of an iteration.
     pub fn iteration(&self, iteration: u32) -> Recording {
         let mut recording = reporting();
+        let (order, gather) = self.method();
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
             self.camera(iteration, &mut recording);
+            order(self.sizes, &mut recording);
         }
         for batch in 0..self.sizes.batches(self.config.photons) {
             self.photons(iteration, batch, &mut recording);
-            (METHODS[self.config.gather].record)(self.sizes, &mut recording);
+            gather(self.sizes, &mut recording);
         }
         recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(iteration));
         recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.slots()));
         recording
+    }
+
+    /// The commands that make the picture, after so many iterations and photon paths.
+    pub fn picture(&self, iterations: u32, emitted: u64) -> Recording {
+        let mut recording = reporting();
+        let push = [iterations, (emitted as f32).to_bits()];
+        recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
+        recording
+    }
+
+    /// What the gather method records for new visible points, and for a batch of photons.
+    fn method(&self) -> (Record, Record) {
+        method_stages(self.config.gather.unwrap_or_else(default_method))
     }
 
     /// Finding the visible points.
@@ -100,11 +121,20 @@ impl Renderer {
     /// A setting outside its range, a device without enough memory, or a failed Vulkan call.
     pub fn new(mut device: Device, scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
         config.check()?;
+        let method = &METHODS[config.gather.unwrap_or_else(default_method)];
+        if method.stages().is_none() {
+            return Err(Error::Config(format!(
+                "--gather {}: runs on the CPU; add --backend cpu",
+                method.name
+            )));
+        }
         let limits = Limits {
             storage_buffer_bytes: device.summary().max_storage_buffer_bytes,
             loop_limit: loop_budget(device.loop_limit()),
             lanes: if device.summary().kind == "cpu" { 4096 } else { 1 << 18 },
             glass: scene.has_glass(),
+            meshes: scene.object_grids.len() as u32,
+            object_cells: scene.object_cells,
         };
         let triangles = scene.shading_triangles.len() as u32;
         if config.accel == Accel::Brute && triangles > limits.loop_limit {
@@ -120,6 +150,7 @@ impl Renderer {
         device.upload(BufferId::ShadingTriangles, &scene.shading_triangles)?;
         device.upload(BufferId::Materials, &scene.materials)?;
         device.upload(BufferId::Lights, &scene.lights)?;
+        device.upload(BufferId::ObjectGrids, &scene.object_grids)?;
         let settings = settings(&config, scene, camera, limits.loop_limit);
         let mut renderer = Self {
             device,
@@ -131,8 +162,12 @@ impl Renderer {
             emitted: 0,
             counters: Counters::default(),
         };
-        renderer.create_picture_buffers()?;
-        renderer.create_photon_buffers()?;
+        renderer.upload_settings()?;
+        // Before any work: memory that lacks is told now and not after an hour.
+        let stages = renderer.stages();
+        let (iteration, picture) = (stages.iteration(0), stages.picture(1, 1));
+        renderer.make_buffers(&iteration)?;
+        renderer.make_buffers(&picture)?;
         renderer.choose_radius()?;
         Ok(renderer)
     }
@@ -149,7 +184,7 @@ impl Renderer {
     fn run_until_it_fits(&mut self, record: impl Fn(Stages<'_>) -> Recording) -> Result<(Run, StatusCounters)> {
         let mut all = Run::default();
         for _ in 0..REPEATS {
-            let run = self.device.run(&record(self.stages()))?;
+            let run = self.run(&record(self.stages()))?;
             all.launches.extend(run.launches);
             all.wall += run.wall;
             let status = self.status()?;
@@ -176,14 +211,14 @@ impl Renderer {
         }
         if status.again & (LANES_TOO_LONG | PHOTONS_DID_NOT_FIT) != 0 {
             self.sizes.shrink_batch(&self.limits);
-            self.create_photon_buffers()?;
+            self.upload_settings()?;
         }
         if status.again & GATHERS_TOO_LONG != 0 {
             self.sizes.gather_parts = self.sizes.gather_parts.saturating_mul(2);
         }
         let mut recording = Recording::new();
         recording.fill(BufferId::GatheredOf, 0);
-        self.device.run(&recording).map(|_| ())
+        self.run(&recording).map(|_| ())
     }
 
     /// What the last recording that began with [`reporting`] reported.
@@ -193,6 +228,39 @@ impl Renderer {
             .first()
             .copied()
             .ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
+    }
+
+    /// Finds the first visible points and traces a batch of the first photons, for gathers to be tried on. Returns what
+    /// it took.
+    ///
+    /// # Errors
+    /// As [`Backend::iterate`].
+    pub fn trace(&mut self) -> Result<Run> {
+        let (run, _) = self.run_until_it_fits(|stages| {
+            let mut recording = reporting();
+            stages.camera(0, &mut recording);
+            stages.photons(0, 0, &mut recording);
+            recording
+        })?;
+        Ok(run)
+    }
+
+    /// Gathers the photons at hand with any method of a device; what was gathered before is forgotten. Returns what it
+    /// took, and what it reported.
+    ///
+    /// # Errors
+    /// As [`Backend::iterate`].
+    pub fn gather(&mut self, method: usize, probe: Probe) -> Result<(Run, StatusCounters)> {
+        self.sizes.probe = probe;
+        self.run_until_it_fits(|stages| {
+            let mut recording = reporting();
+            recording.fill(BufferId::GatheredOf, 0);
+            recording.fill(BufferId::TestsOf, 0);
+            let (order, gather) = method_stages(method);
+            order(stages.sizes, &mut recording);
+            gather(stages.sizes, &mut recording);
+            recording
+        })
     }
 
     /// The buffers' sizes.
@@ -205,58 +273,36 @@ impl Renderer {
         &mut self.device
     }
 
-    fn create_picture_buffers(&mut self) -> Result<()> {
-        use crate::layout::{DirectSum, Gathered, RadiusSum, Statistics};
-        let slots = u64::from(self.sizes.slots());
-        let pixels = u64::from(self.config.resolution[0]) * u64::from(self.config.resolution[1]);
-        let groups = slots.div_ceil(u64::from(shaders::GRID_RADII.workgroup));
-        for (id, count, size) in [
-            (BufferId::VisiblePoints, slots, size_of::<VisiblePoint>()),
-            (BufferId::StatisticsOf, slots, size_of::<Statistics>()),
-            (BufferId::GatheredOf, slots, size_of::<Gathered>()),
-            (BufferId::DirectSums, slots, size_of::<DirectSum>()),
-            (BufferId::RadiusSums, groups, size_of::<RadiusSum>()),
-            (BufferId::Film, pixels, 16),
-            (BufferId::Status, 1, size_of::<StatusCounters>()),
-            (BufferId::Grid, 1, size_of::<crate::layout::GridShape>()),
-            (BufferId::PhotonCount, 1, 4),
-            (BufferId::ScanTotal, 1, 4),
-        ] {
-            self.device.create(id, count * size as u64)?;
-        }
-        Ok(())
-    }
-
-    fn create_photon_buffers(&mut self) -> Result<()> {
+    /// Tells the kernels the buffers' sizes.
+    fn upload_settings(&mut self) -> Result<()> {
         let sizes = &self.sizes;
-        let photons = u64::from(sizes.photon_lanes) * u64::from(sizes.lane_capacity);
-        let lanes = u64::from(sizes.photon_lanes);
-        let cells = 1u64 << sizes.cell_bits;
-        let histograms = photons.div_ceil(u64::from(crate::config::SORT_TILE)) << crate::config::SORT_DIGIT_BITS;
-        let scanned = histograms.max(lanes);
-        let scan_sums = scanned.div_ceil(u64::from(crate::config::SCAN_BLOCK));
-        for (id, count, size) in [
-            (BufferId::LanePhotons, photons, size_of::<Photon>()),
-            (BufferId::Photons, photons, size_of::<Photon>()),
-            (BufferId::SortedPhotons, photons, size_of::<Photon>()),
-            (BufferId::LaneCounts, lanes, 4),
-            (BufferId::LaneOffsets, lanes, 4),
-            (BufferId::Keys, photons, 4),
-            (BufferId::Values, photons, 4),
-            (BufferId::OtherKeys, photons, 4),
-            (BufferId::OtherValues, photons, 4),
-            (BufferId::Histograms, histograms, 4),
-            (BufferId::ScanSums, scan_sums, 4),
-            (BufferId::CellRanges, cells, size_of::<CellRange>()),
-        ] {
-            self.device.create(id, count * size as u64)?;
-        }
         self.settings.photon_lanes = sizes.photon_lanes;
         self.settings.lane_capacity = sizes.lane_capacity;
         self.settings.photon_capacity = sizes.photon_capacity();
         self.settings.cell_bits = sizes.cell_bits;
         self.settings.slots_per_pixel = sizes.slots_per_pixel;
         self.device.upload(BufferId::Settings, &[self.settings])
+    }
+
+    /// Makes the buffers that a recording touches, where they aren't there or of another size.
+    fn make_buffers(&mut self, recording: &Recording) -> Result<()> {
+        for id in recording.buffers() {
+            if let Some(bytes) = self.sizes.bytes(id)
+                && self.device.size(id) != bytes.max(4)
+            {
+                self.device.create(id, bytes)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs a recording on the device, after making the buffers that it needs.
+    ///
+    /// # Errors
+    /// A device without enough memory, or a failed Vulkan call.
+    pub fn run(&mut self, recording: &Recording) -> Result<Run> {
+        self.make_buffers(recording)?;
+        self.device.run(recording)
     }
 
     /// Takes the user's radius, or finds one from the density of pilot photons: one for the median visible point, then
@@ -278,18 +324,20 @@ impl Renderer {
         let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
         let radius = radius::automatic(&visible_points, &photons) as f32;
         self.settings.initial_radius2 = radius * radius * share;
-        self.device.upload(BufferId::Settings, &[self.settings])?;
+        self.upload_settings()?;
         self.reset()?;
         for _ in 0..radius::FITS {
             self.run_until_it_fits(|stages| {
                 let mut recording = reporting();
-                (METHODS[stages.config.gather].record)(stages.sizes, &mut recording);
+                let (order, gather) = stages.method();
+                order(stages.sizes, &mut recording);
+                gather(stages.sizes, &mut recording);
                 recording
             })?;
             let wanted = radius::PHOTONS_WANTED as f32 * share;
             let mut recording = Recording::new();
             recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, self.sizes.slots()).push(wanted));
-            self.device.run(&recording)?;
+            self.run(&recording)?;
         }
         self.counters = Counters::default();
         Ok(())
@@ -299,7 +347,7 @@ impl Renderer {
         let mut recording = reporting();
         recording.fill(BufferId::DirectSums, 0);
         recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.slots()));
-        self.device.run(&recording).map(|_| ())
+        self.run(&recording).map(|_| ())
     }
 }
 
@@ -312,16 +360,16 @@ impl Backend for Renderer {
         counters.truncated_paths += u64::from(status.truncated_paths);
         counters.cut_paths += u64::from(status.cut_paths);
         counters.non_finite += u64::from(status.non_finite);
+        counters.lost_photons += u64::from(status.lost_photons);
+        counters.full_cells += u64::from(status.full_cells);
         self.iterations += 1;
         self.emitted += u64::from(self.config.photons);
         Ok(run)
     }
 
     fn resolve(&mut self) -> Result<Image> {
-        let mut recording = reporting();
-        let push = [self.iterations.max(1), (self.emitted.max(1) as f32).to_bits()];
-        recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
-        self.device.run(&recording)?;
+        let recording = self.stages().picture(self.iterations.max(1), self.emitted.max(1));
+        self.run(&recording)?;
         self.counters.non_finite += u64::from(self.status()?.non_finite);
         let [width, height] = self.config.resolution.map(|side| side as usize);
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;

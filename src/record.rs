@@ -1,7 +1,7 @@
 //! Stages to commands: puts a barrier before each command that touches what an earlier one wrote, or writes what an
 //! earlier one read. Knows no Vulkan, so that the hazards of a whole iteration are tested without a device.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::time::Duration;
 
 use crate::stage::{BufferId, StageDesc};
@@ -60,6 +60,12 @@ impl Recording {
     /// The commands.
     pub fn commands(&self) -> &[Command] {
         &self.commands
+    }
+
+    /// The buffers that the commands touch, each once.
+    pub fn buffers(&self) -> BTreeSet<BufferId> {
+        let touches = self.commands.iter().flat_map(Command::touches);
+        touches.map(|(buffer, _)| buffer).collect()
     }
 
     fn push(&mut self, command: Command) {

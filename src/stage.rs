@@ -28,7 +28,7 @@ pub enum BufferId {
     GatheredOf,
     /// [`crate::layout::DirectSum`] of each slot.
     DirectSums,
-    /// [`crate::layout::RadiusSum`] of each workgroup of slots.
+    /// [`crate::layout::RadiusSum`] of each share of the slots.
     RadiusSums,
     /// [`crate::layout::Photon`]s as the lanes store them: number-major, `[number][lane]`.
     LanePhotons,
@@ -40,12 +40,46 @@ pub enum BufferId {
     PhotonCount,
     /// [`crate::layout::Photon`]s in path order within their lane.
     Photons,
-    /// [`crate::layout::Photon`]s in the order of their grid cells.
+    /// [`crate::layout::Photon`]s in the order of their grid cells or meshes.
     SortedPhotons,
     /// [`crate::layout::GridShape`].
     Grid,
-    /// [`crate::layout::CellRange`] of each grid bucket.
-    CellRanges,
+    /// First photon of each grid bucket and, past the last one, the number of photons, u32.
+    CellStarts,
+    /// One past each mesh's last photon, u32.
+    MeshEnds,
+    /// [`crate::layout::ObjectGrid`] of each object.
+    ObjectGrids,
+    /// First photon of each cell of the objects' grids and, past the last one, the number of photons, u32.
+    ObjectCells,
+    /// Photons that have a place in each of those cells, u32.
+    ObjectCellCursors,
+    /// Slots in the order of the workgroups that gather for them, u32; [`crate::config::NO_SLOT`] for fillers.
+    PointOrder,
+    /// Slots by mesh and along a curve within it, u32; [`crate::config::NO_SLOT`] for fillers.
+    MeshOrder,
+    /// Fillers of the meshes before, u32.
+    MeshFillers,
+    /// Number of slots, one u32.
+    PointCount,
+    /// Sort keys of visible points, u32.
+    PointKeys,
+    /// Slots that are sorted by [`BufferId::PointKeys`], u32.
+    PointValues,
+    /// Sort keys of visible points after every other pass.
+    OtherPointKeys,
+    /// Slots after every other pass.
+    OtherPointValues,
+    /// Centre of each cluster of visible points, vec4; w: u32 bits, its mesh.
+    Centroids,
+    /// Cluster of each place of [`BufferId::MeshOrder`], u32.
+    ClusterOf,
+    /// Visible points of each cluster, u32.
+    ClusterSizes,
+    /// First place of each cluster in [`BufferId::PointOrder`], u32.
+    ClusterStarts,
+    /// Photons tested for each slot, u32, where they are counted.
+    TestsOf,
     /// Sort keys, u32.
     Keys,
     /// What is sorted by [`BufferId::Keys`], u32.
@@ -67,6 +101,10 @@ pub enum BufferId {
 
     /// Parameter: the numbers that a prefix sum is taken of.
     Scan,
+    /// Parameter: the photons that are gathered.
+    GatheredFrom,
+    /// Parameter: the order that is made.
+    OrderOut,
     /// Parameter: how many keys to sort, one u32.
     SortCount,
     /// Parameter: keys before a sort pass.

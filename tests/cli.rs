@@ -131,7 +131,7 @@ fn profiles_and_traces_list_every_stage() {
     let profile = read("p.json");
     let events = read("t.json")["traceEvents"].as_array().expect("events").len();
     let stages = profile["stages"].as_array().expect("stages");
-    for stage in ["camera", "photons", "gather_grid", "direct", "update"] {
+    for stage in ["camera", "photons", "gather_clustered", "direct", "update"] {
         assert!(table.contains(stage), "{stage} isn't in the table:\n{table}");
         assert!(
             stages.iter().any(|entry| entry["stage"] == stage),
@@ -326,7 +326,7 @@ fn the_processor_renders_without_vulkan() {
     );
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(
-        String::from_utf8_lossy(&output.stdout).contains("kd-tree"),
+        String::from_utf8_lossy(&output.stdout).contains("cpu-kdtree"),
         "the profile names the CPU's gather"
     );
     let conflict = small_render(
@@ -334,7 +334,17 @@ fn the_processor_renders_without_vulkan() {
         &scene("cornell.gltf"),
         &["--backend", "cpu", "--gather", "naive"],
     );
-    assert_refused(&conflict, "--backend cpu");
+    assert_refused(&conflict, "--backend");
+    let implied = small_render(
+        folder.path(),
+        &scene("cornell.gltf"),
+        &["--gather", "cpu-naive", "--profile"],
+    );
+    assert!(
+        String::from_utf8_lossy(&implied.stdout).contains("gather cpu-naive\non CPU"),
+        "a method of the CPU brings its backend: {}",
+        stderr(&implied)
+    );
 }
 
 #[test]
@@ -387,7 +397,10 @@ fn lists_go_to_stdout() {
     let folder = TempDir::new().expect("folder");
     let scene = scene("cornell-spheres.gltf");
     for (arguments, words) in [
-        (vec!["gathers"], vec!["naive", "grid"]),
+        (
+            vec!["gathers"],
+            vec!["naive", "cluster-grid", "clustered", "cpu-kdtree"],
+        ),
         (vec!["devices"], vec!["driver", "storage buffer"]),
         (
             vec!["inspect", scene.to_str().expect("UTF-8")],

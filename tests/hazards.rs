@@ -33,9 +33,12 @@ fn unprotected(commands: &[Command]) -> Vec<(usize, usize)> {
 fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording)> {
     let mut recordings = Vec::new();
     for (index, method) in METHODS.iter().enumerate() {
+        if method.stages().is_none() {
+            continue;
+        }
         let config = RenderConfig {
             resolution: [320, 280],
-            gather: index,
+            gather: Some(index),
             photons,
             ..RenderConfig::default()
         };
@@ -44,6 +47,8 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
             loop_limit: u32::MAX,
             lanes: 4096,
             glass: true,
+            meshes: 9,
+            object_cells: 9 * 1024,
         };
         let sizes = Sizes::new(&config, limits);
         let stages = Stages {

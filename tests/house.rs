@@ -74,7 +74,7 @@ fn imports_go_downward() {
             ],
         ),
         (
-            "gather.rs",
+            "gather",
             &[
                 "crate::scene",
                 "crate::gpu",

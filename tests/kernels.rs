@@ -11,6 +11,8 @@ mod gather;
 mod limits;
 #[path = "kernels/oracle.rs"]
 mod oracle;
+#[path = "kernels/orders.rs"]
+mod orders;
 #[path = "kernels/photons.rs"]
 mod photons;
 #[path = "kernels/pictures.rs"]

@@ -194,11 +194,14 @@ fn both_estimators_agree() {
 #[test]
 fn every_gather_method_gives_the_same_picture() {
     let config = |index| RenderConfig {
-        gather: index,
+        gather: Some(index),
         ..small(48, 20_000)
     };
     let first = render("cornell-spheres", 3, config(0));
     for (index, method) in gather::METHODS.iter().enumerate().skip(1) {
+        if method.stages().is_none() {
+            continue;
+        }
         let other = render("cornell-spheres", 3, config(index));
         for (pixel, (a, b)) in first.pixels().iter().zip(other.pixels()).enumerate() {
             for channel in 0..3 {

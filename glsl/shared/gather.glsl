@@ -1,16 +1,28 @@
-// What all gathers share. Include after sampling.glsl, photon.glsl and visible_point.glsl.
+// What all gathers share. Include after sampling.glsl, texel.glsl, photon.glsl, visible_point.glsl and statistics.glsl.
+
+// Whether the photons tested are counted, for reports.
+layout(constant_id = 0) const bool COUNT_TESTS = false;
+
+uniform usamplerBuffer VisiblePoints;
+uniform usamplerBuffer StatisticsOf;
+layout(std430) buffer GatheredOf { Gathered gathered[]; };
+layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot, where they are counted
 
 // The gather's side of a visible point.
 struct Receiver {
     vec3 position;
     float radius2;
-    uint object;
-    vec3 normal;
+    uint object; // NO_OBJECT where there is no visible point
+    vec3 normal; // of any length
 };
 
-Receiver receiver_of(VisiblePoint visible_point, float radius2) {
-    return Receiver(visible_point.position_object.xyz, radius2, floatBitsToUint(visible_point.position_object.w),
-                    decode_direction(floatBitsToUint(visible_point.weight_normal.w)));
+const Receiver NO_RECEIVER = Receiver(vec3(0.0), -1.0, NO_OBJECT, vec3(0.0));
+
+Receiver receiver_at(uint slot) {
+    vec4 position_object = TEXEL(VisiblePoints, 3u * slot);
+    vec4 weight_normal = TEXEL(VisiblePoints, 3u * slot + 1u);
+    return Receiver(position_object.xyz, TEXEL(StatisticsOf, 3u * slot).x, floatBitsToUint(position_object.w),
+                    decode_octahedral(floatBitsToUint(weight_normal.w)));
 }
 
 float squared_distance(vec3 a, vec3 b) {
@@ -23,5 +35,20 @@ float squared_distance(vec3 a, vec3 b) {
 bool accepts(Receiver receiver, Photon photon) {
     return squared_distance(photon.position_object.xyz, receiver.position) <= receiver.radius2 &&
            floatBitsToUint(photon.position_object.w) == receiver.object &&
-           dot(decode_direction(floatBitsToUint(photon.flux_direction.w)), receiver.normal) < 0.0;
+           dot(decode_octahedral(floatBitsToUint(photon.flux_direction.w)), receiver.normal) < 0.0;
+}
+
+// A receiver's part of this launch.
+struct Sum {
+    vec3 flux;
+    uint count;
+};
+
+void add_gathered(uint slot, Sum sum, uint tested) {
+    vec4 before = gathered[slot].flux_count;
+    gathered[slot].flux_count =
+        vec4(before.rgb + sum.flux, uintBitsToFloat(floatBitsToUint(before.w) + sum.count));
+    if (COUNT_TESTS) {
+        tests[slot] += tested;
+    }
 }

@@ -36,11 +36,14 @@ uint encode_direction(vec3 d) {
     return packSnorm2x16(p);
 }
 
-vec3 decode_direction(uint code) {
+// A vector along the coded direction, of length 1/√3 to 1: enough where only the sign of a cosine matters.
+vec3 decode_octahedral(uint code) {
     vec2 p = unpackSnorm2x16(code);
-    vec3 d = vec3(p, 1.0 - abs(p.x) - abs(p.y));
-    if (d.z < 0.0) {
-        d.xy = (1.0 - abs(d.yx)) * sign_not_zero(d.xy);
-    }
-    return normalize(d);
+    float z = 1.0 - abs(p.x) - abs(p.y);
+    float fold = max(-z, 0.0);
+    return vec3(p.x + (p.x >= 0.0 ? -fold : fold), p.y + (p.y >= 0.0 ? -fold : fold), z);
+}
+
+vec3 decode_direction(uint code) {
+    return normalize(decode_octahedral(code));
 }

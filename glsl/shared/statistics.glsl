@@ -20,10 +20,10 @@ struct DirectSum {
     vec4 low;
 };
 
-// The radii of a workgroup's visible points: the grid's cell size follows from them.
+// Sums over radii: the grid's cell size follows from them.
 struct RadiusSum {
-    float radius;  // Σ R
-    float radius2; // the largest R²
+    float radius2;  // Σ R²
+    float inverse2; // Σ 1/R²
+    float largest2; // the largest R²
     uint count;
-    uint padding;
 };

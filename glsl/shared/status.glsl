@@ -7,6 +7,8 @@ struct StatusCounters {
     uint again;               // why the iteration has to be done again; 0: it needn't
     uint photons_stored_low;  // of all batches, 64 bits
     uint photons_stored_high;
+    uint lost_photons;        // beyond the maximum that a user set for a grid cell
+    uint full_cells;          // cells that had more
 };
 
 layout(std430) buffer Status { StatusCounters status; };

@@ -1,14 +1,12 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The bucket of each photon, to be sorted by.
+// The bucket of each photon, to be sorted by, and how many photons each bucket has.
 
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "texel.glsl"
-#include "photon.glsl"
-
 #include "grid.glsl"
 
 layout(std430) readonly buffer Grid { GridShape grid; };
@@ -16,12 +14,15 @@ uniform usamplerBuffer Photons;
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
 layout(std430) writeonly buffer Keys { uint keys[]; };
 layout(std430) writeonly buffer Values { uint values[]; };
+layout(std430) buffer CellStarts { uint cell_photons[]; }; // cleared before
 
 void main() {
     uint i = invocation_index();
     if (i >= photon_count) {
         return;
     }
-    keys[i] = bucket_of(cell_of(TEXEL(Photons, 2u * i).xyz, grid.inverse_cell_size));
+    uint bucket = bucket_of(cell_of(TEXEL(Photons, 2u * i).xyz, grid.inverse_cell_size));
+    keys[i] = bucket;
     values[i] = i;
+    atomicAdd(cell_photons[bucket], 1u);
 }

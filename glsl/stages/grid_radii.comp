@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Sums up the radii of each workgroup's visible points: the grid's cell size follows from them.
+// Sums up the radii of the visible points, a share of them in each workgroup: the grid's cell size follows from them.
 
 layout(local_size_x = 64) in;
 
@@ -11,16 +11,24 @@ layout(local_size_x = 64) in;
 #include "statistics.glsl"
 #include "radius_sums.glsl"
 
+layout(push_constant) uniform Push {
+    uint groups;
+} push;
+
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer StatisticsOf;
 layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
 void main() {
-    uint slot = invocation_index();
-    bool counts = slot < slots() && floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w) != NO_OBJECT;
-    float radius2 = counts ? TEXEL(StatisticsOf, 3u * slot).x : 0.0;
-    RadiusSum sum = sum_of_radii(counts, radius2);
-    if (gl_LocalInvocationID.x == 0u && slot < slots()) {
+    RadiusSum term = RadiusSum(0.0, 0.0, 0.0, 0u);
+    for (uint slot = invocation_index(); slot < slots(); slot += push.groups * gl_WorkGroupSize.x) {
+        if (floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w) != NO_OBJECT) {
+            float radius2 = TEXEL(StatisticsOf, 3u * slot).x;
+            term = together(term, RadiusSum(radius2, 1.0 / radius2, radius2, 1u));
+        }
+    }
+    RadiusSum sum = reduce(term);
+    if (gl_LocalInvocationID.x == 0u && workgroup_index() < push.groups) {
         radius_sums[workgroup_index()] = sum;
     }
 }

@@ -1,39 +1,40 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Chooses the grid's cell size: twice the mean radius, so that most visible points look into eight cells; more where
-// some radii are far larger.
+// Chooses the grid's cell size s. A visible point of radius R looks into (2R/s + 1)² rows of cells, and finds photons of
+// an area (2R + s)² there; where radii were fitted to the photons' density, that is as many as (2 + s/R)². What grows as
+// R²/s² and what grows as s²/R² weigh the same, over all points, at s⁴ = c⁴ · ΣR² / ΣR⁻².
 
-layout(local_size_x = 128) in;
+layout(local_size_x = 64) in;
 
 #include "settings.glsl"
 #include "statistics.glsl"
 #include "radius_sums.glsl"
+#include "grid.glsl"
 
 layout(push_constant) uniform Push {
     uint count; // partial sums
 } push;
 
-#include "grid.glsl"
-
 layout(std430) writeonly buffer Grid { GridShape grid; };
 layout(std430) readonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
+// c: s / R where all radii are alike. Measured, see docs/gather.md.
+const float CELLS_TO_RADIUS = 1.25;
 // Render units. Positions resolve 6e-8: finer cells would gain nothing, and a visible point would reach too many of them.
 const float SMALLEST_CELL = 1.0 / 1048576.0;
+// Cells that the largest radius may span: the few points that have it must not hold up the rest.
+const float MOST_CELLS = 16.0;
 
 void main() {
-    RadiusSum term = RadiusSum(0.0, 0.0, 0u, 0u);
+    RadiusSum term = RadiusSum(0.0, 0.0, 0.0, 0u);
     for (uint i = gl_LocalInvocationID.x; i < push.count; i += gl_WorkGroupSize.x) {
-        RadiusSum sum = radius_sums[i];
-        term.radius += sum.radius;
-        term.radius2 = max(term.radius2, sum.radius2);
-        term.count += sum.count;
+        term = together(term, radius_sums[i]);
     }
     RadiusSum all = reduce(term);
     if (gl_LocalInvocationID.x == 0u) {
-        float mean = all.radius / float(max(all.count, 1u));
-        // The largest radius must not reach too many cells.
-        float cell_size = max(max(2.0 * mean, sqrt(all.radius2) / 8.0), SMALLEST_CELL);
+        // Without a visible point the sums are 0, and any size will do.
+        float balanced = all.count > 0u ? CELLS_TO_RADIUS * sqrt(sqrt(all.radius2 / all.inverse2)) : 1.0;
+        float cell_size = max(max(balanced, sqrt(all.largest2) / MOST_CELLS), SMALLEST_CELL);
         grid.inverse_cell_size = 1.0 / cell_size;
     }
 }

@@ -98,6 +98,10 @@ pub struct RenderArguments {
     /// How visible points find their photons (ppm-vk gathers lists the methods) [default: the fastest].
     #[arg(long, value_name = "METHOD", value_parser = gather_method)]
     pub gather: Option<usize>,
+    /// Photons that a cell of --gather cluster-grid holds at the most, as in the paper: more are lost, and counted
+    /// [default: cells hold all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub cell_photons: Option<u32>,
     /// How rays meet triangles.
     #[arg(long, value_enum, default_value_t = Accel::Bvh)]
     pub accel: Accel,
@@ -110,9 +114,9 @@ pub struct RenderArguments {
     /// Vulkan device, by a part of its name or its index [default: the best].
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
-    /// What computes.
-    #[arg(long, value_enum, default_value_t = BackendChoice::Vulkan)]
-    pub backend: BackendChoice,
+    /// What computes [default: what the gather method runs on].
+    #[arg(long, value_enum)]
+    pub backend: Option<BackendChoice>,
     /// After the run, print what each stage took.
     #[arg(long)]
     pub profile: bool,

@@ -14,7 +14,7 @@ use super::{Outcome, interrupt};
 use crate::backend::Backend;
 use crate::config::RenderConfig;
 use crate::film::{self, Metadata};
-use crate::gather::{self, METHODS};
+use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
 use crate::report::{Profile, Subject};
@@ -30,10 +30,7 @@ const DEFAULT_ITERATIONS: u32 = 64;
 /// The render command.
 pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let path = arguments.scene.as_deref().context("--scene is missing")?;
-    if arguments.backend == BackendChoice::Cpu && (arguments.device.is_some() || arguments.gather.is_some()) {
-        let text = "--backend cpu has no --device, and its own --gather (a kd-tree)";
-        Arguments::command().error(ErrorKind::ArgumentConflict, text).exit();
-    }
+    let (backend_choice, gather) = choose_backend(arguments);
     let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
     // Before any work: nobody wants to learn after an hour that the picture can't be written.
     let outputs: Vec<&Path> = outputs(arguments, &output).collect();
@@ -48,9 +45,9 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         say!("warning: {warning}");
     }
     let camera = &scene.cameras[scene.camera_index(arguments.camera.as_deref())?];
-    let config = config(arguments, camera);
+    let config = config(arguments, gather, camera);
     let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(path, what))?;
-    let mut backend = open(arguments, &packed, camera, &config)?;
+    let mut backend = open(backend_choice, arguments.device.as_deref(), &packed, camera, &config)?;
     if arguments.radius.is_none() {
         say!(
             "initial radius {:.6} scene units (automatic)",
@@ -109,10 +106,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let subject = Subject {
         scene: scene.name.clone(),
         resolution: config.resolution,
-        gather: match arguments.backend {
-            BackendChoice::Vulkan => METHODS[config.gather].name.to_owned(),
-            BackendChoice::Cpu => "kd-tree".to_owned(),
-        },
+        gather: METHODS[gather].name.to_owned(),
         photons: config.photons,
         device: backend.device(),
         counters: backend.counters(),
@@ -125,22 +119,47 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     })
 }
 
+/// What computes, and the gather method: each follows the other where the user names one alone.
+fn choose_backend(arguments: &RenderArguments) -> (BackendChoice, usize) {
+    let of_method = |method: usize| match METHODS[method].runs {
+        Runs::Device { .. } => BackendChoice::Vulkan,
+        Runs::CpuKdTree | Runs::CpuNaive => BackendChoice::Cpu,
+    };
+    let (backend, method) = match (arguments.backend, arguments.gather) {
+        (backend, Some(method)) => (backend.unwrap_or(of_method(method)), method),
+        (Some(BackendChoice::Cpu), None) => (BackendChoice::Cpu, gather::default_cpu_method()),
+        (_, None) => (BackendChoice::Vulkan, gather::default_method()),
+    };
+    let conflict = if backend != of_method(method) {
+        Some("this --gather doesn't run on this --backend; leave one of them out")
+    } else if backend == BackendChoice::Cpu && arguments.device.is_some() {
+        Some("the CPU backend has no --device")
+    } else {
+        None
+    };
+    if let Some(text) = conflict {
+        Arguments::command().error(ErrorKind::ArgumentConflict, text).exit();
+    }
+    (backend, method)
+}
+
 fn open(
-    arguments: &RenderArguments,
+    backend: BackendChoice,
+    device: Option<&str>,
     scene: &PackedScene,
     camera: &Camera,
     config: &RenderConfig,
 ) -> Result<Box<dyn Backend>> {
-    Ok(match arguments.backend {
+    Ok(match backend {
         BackendChoice::Vulkan => {
-            let device = Device::open(arguments.device.as_deref())?;
+            let device = Device::open(device)?;
             Box::new(Renderer::new(device, scene, camera, config.clone())?)
         }
         BackendChoice::Cpu => Box::new(crate::cpu::Renderer::new(scene, camera, config.clone())?),
     })
 }
 
-fn config(arguments: &RenderArguments, camera: &Camera) -> RenderConfig {
+fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> RenderConfig {
     RenderConfig {
         resolution: arguments.resolution.unwrap_or_else(|| {
             let height = DEFAULT_WIDTH as f32 / camera.aspect.unwrap_or(DEFAULT_ASPECT);
@@ -151,7 +170,8 @@ fn config(arguments: &RenderArguments, camera: &Camera) -> RenderConfig {
         direct: arguments.direct,
         alpha: arguments.alpha,
         radius: arguments.radius,
-        gather: arguments.gather.unwrap_or_else(gather::default_method),
+        gather: Some(gather),
+        cell_photons: arguments.cell_photons,
         accel: arguments.accel,
         max_depth: arguments.max_depth,
         seed: arguments.seed,

@@ -5,12 +5,14 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::{
-    Batch, Counts, Inputs, camera, compact, direct, fit_radius, gather_kd_tree, photons, reset, resolve, update,
+    Batch, Counts, Inputs, camera, compact, direct, fit_radius, gather_kd_tree, gather_naive, photons, reset, resolve,
+    update,
 };
 use crate::backend::{Backend, Counters, DeviceDescription, settings};
 use crate::config::{Estimator, Limits, RenderConfig, Sizes};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::Image;
+use crate::gather::{METHODS, Runs, default_cpu_method};
 use crate::layout::{DirectSum, Gathered, Settings, Statistics, VisiblePoint};
 use crate::radius;
 use crate::record::{Launch, Run};
@@ -39,18 +41,26 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Prepares a render: finds the radius, resets the statistics. The gather method of `config` doesn't matter: on the
-    /// CPU it is a kd-tree.
+    /// Prepares a render: finds the radius, resets the statistics.
     ///
     /// # Errors
     /// A setting outside its range, or more photons in a batch than the kd-tree can number.
     pub fn new(scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
         config.check()?;
+        let method = &METHODS[config.gather.unwrap_or_else(default_cpu_method)];
+        if method.stages().is_some() {
+            return Err(Error::Config(format!(
+                "--gather {}: runs on a Vulkan device; leave out --backend cpu",
+                method.name
+            )));
+        }
         let limits = Limits {
             storage_buffer_bytes: PHOTON_BYTES,
             loop_limit: u32::MAX,
             lanes: LANES,
             glass: scene.has_glass(),
+            meshes: scene.object_grids.len() as u32,
+            object_cells: scene.object_cells,
         };
         let sizes = Sizes::new(&config, limits);
         let slots = sizes.slots() as usize;
@@ -143,9 +153,15 @@ impl Backend for Renderer {
             let batch = batch_of(&self.sizes, &self.config, iteration, batch);
             let lanes = clock.time("photons", || photons(&inputs, batch, &counts));
             let photons = clock.time("compact", || compact(&lanes));
-            clock.time("gather_kd_tree", || {
-                gather_kd_tree(&self.visible_points, &self.statistics, &photons, &mut self.gathered)
-            })?;
+            let (points, statistics, gathered) = (&self.visible_points, &self.statistics, &mut self.gathered);
+            match METHODS[self.config.gather.unwrap_or_else(default_cpu_method)].runs {
+                Runs::CpuNaive => {
+                    clock.time("gather_naive", || gather_naive(points, statistics, &photons, gathered));
+                }
+                _ => clock.time("gather_kd_tree", || {
+                    gather_kd_tree(points, statistics, &photons, gathered)
+                })?,
+            }
             self.counters.photons_stored += photons.len() as u64;
         }
         clock.time("direct", || {

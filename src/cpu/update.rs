@@ -66,24 +66,29 @@ pub fn update(
         });
 }
 
-/// The radii of each group of `group` slots, from which the device chooses the next grid.
-pub fn radius_sums(visible_points: &[VisiblePoint], statistics: &[Statistics], group: usize) -> Vec<RadiusSum> {
-    let groups = visible_points.chunks(group).zip(statistics.chunks(group));
-    let sum_up = |(points, statistics): (&[VisiblePoint], &[Statistics])| {
-        let (mut sum, mut largest, mut count) = (0.0, 0.0f32, 0);
-        for (point, statistics) in points.iter().zip(statistics) {
-            if word(point.position_object) != NO_OBJECT {
-                sum += f64::from(statistics.radius2_high).sqrt();
-                largest = largest.max(statistics.radius2_high);
-                count += 1;
-            }
+/// Sums over the visible points' radii in `groups` shares, from which the device chooses the next grid: points are dealt
+/// to shares in turn, `size` at a time.
+pub fn radius_sums(
+    visible_points: &[VisiblePoint],
+    statistics: &[Statistics],
+    groups: usize,
+    size: usize,
+) -> Vec<RadiusSum> {
+    let mut sums = vec![(0.0f64, 0.0f64, 0.0f32, 0u32); groups];
+    for (slot, (point, statistics)) in visible_points.iter().zip(statistics).enumerate() {
+        if word(point.position_object) != NO_OBJECT {
+            let (radius2, inverse2, largest2, count) = &mut sums[slot / size % groups];
+            *radius2 += f64::from(statistics.radius2_high);
+            *inverse2 += 1.0 / f64::from(statistics.radius2_high);
+            *largest2 = largest2.max(statistics.radius2_high);
+            *count += 1;
         }
-        RadiusSum {
-            radius: sum as f32,
-            radius2: largest,
-            count,
-            padding: 0,
-        }
+    }
+    let to_sum = |(radius2, inverse2, largest2, count)| RadiusSum {
+        radius2: radius2 as f32,
+        inverse2: inverse2 as f32,
+        largest2,
+        count,
     };
-    groups.map(sum_up).collect()
+    sums.into_iter().map(to_sum).collect()
 }

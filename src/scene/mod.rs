@@ -17,7 +17,8 @@ mod graph;
 mod light;
 mod load;
 mod material;
-pub mod packed;
+pub mod object_grid;
+mod packed;
 mod primitive;
 
 pub use packed::PackedScene;

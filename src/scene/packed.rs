@@ -2,8 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
+use super::object_grid::object_grids;
 use super::{Scene, Surface, bvh};
-use crate::layout::{BvhNode, HavelTriangle, Light, Material, NO_LIGHT, ShadingTriangle};
+use crate::layout::{BvhNode, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, ShadingTriangle};
 
 /// A dielectric's [`Material::surface`].
 const DIELECTRIC: u32 = 2;
@@ -23,6 +24,10 @@ pub struct PackedScene {
     pub lights: Vec<Light>,
     /// Σ mean(Le) · π · area · sides over the lights, render units.
     pub light_flux: f64,
+    /// The paper's grid of each object.
+    pub object_grids: Vec<ObjectGrid>,
+    /// Cells of all of them.
+    pub object_cells: u32,
     /// Index in [`Scene::triangles`] of each packed triangle.
     pub order: Vec<u32>,
     /// Render units per scene unit.
@@ -52,7 +57,10 @@ impl PackedScene {
         for (index, light) in lights.iter().enumerate() {
             shading_triangles[light.triangle as usize].light = index as u32;
         }
+        let (object_grids, object_cells) = object_grids(scene);
         Ok(Self {
+            object_grids,
+            object_cells,
             havel_triangles: corners.iter().map(havel_triangle).collect(),
             shading_triangles,
             bsdf_sampling: bsdf_sampling(scene, &lights),

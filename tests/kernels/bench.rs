@@ -45,8 +45,14 @@ pub struct Bench {
 
 impl Bench {
     pub fn new(name: &str, config: RenderConfig) -> Self {
+        Self::with(name, config, |_| ())
+    }
+
+    /// The same with a change to the scene.
+    pub fn with(name: &str, config: RenderConfig, change: impl FnOnce(&mut PackedScene)) -> Self {
         let loaded = scene(name);
-        let scene = packed(&loaded);
+        let mut scene = packed(&loaded);
+        change(&mut scene);
         let device = Device::open(None).expect("a Vulkan device");
         let mut renderer = Renderer::new(device, &scene, &loaded.cameras[0], config.clone()).expect("a renderer");
         renderer.iterate().expect("an iteration");
@@ -75,9 +81,19 @@ impl Bench {
 
     /// Makes a buffer of the device hold this.
     pub fn upload<T: bytemuck::NoUninit>(&mut self, id: BufferId, data: &[T]) {
+        // The renderer makes buffers of another size anew.
+        let mut bytes: Vec<u8> = bytemuck::cast_slice(data).to_vec();
+        if let Some(size) = self.renderer.sizes().bytes(id) {
+            assert!(
+                bytes.len() as u64 <= size,
+                "{id:?} has no room for {} bytes",
+                bytes.len()
+            );
+            bytes.resize(size as usize, 0);
+        }
         self.renderer
             .gpu()
-            .upload(id, data)
+            .upload(id, &bytes)
             .unwrap_or_else(|error| panic!("{id:?}: {error}"));
     }
 

@@ -1,10 +1,12 @@
 //! The gather methods: every one finds the same photons, N and M exactly, as testing each photon on the CPU.
 
-use ppm_vk::config::RenderConfig;
+use ppm_vk::backend::Backend;
+use ppm_vk::config::{Probe, RenderConfig};
 use ppm_vk::cpu::{self, Counts};
-use ppm_vk::gather::{GatherMethod, METHODS};
-use ppm_vk::layout::{GATHERS_TOO_LONG, Gathered, Photon, Statistics, StatusCounters, VisiblePoint};
+use ppm_vk::gather::{self, METHODS};
+use ppm_vk::layout::{Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
 use ppm_vk::record::Recording;
+use ppm_vk::scene::PackedScene;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
@@ -55,49 +57,30 @@ fn assert_methods_agree(
     bench.upload(BufferId::VisiblePoints, points);
     bench.upload(BufferId::Photons, photons);
     bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);
-    for method in METHODS {
+    for (index, method) in METHODS.iter().enumerate() {
+        if method.stages().is_none() {
+            continue;
+        }
         let what = format!("{case}, {}", method.name);
         bench.upload(BufferId::StatisticsOf, statistics);
-        let found = gather(bench, method, &what);
+        bench
+            .renderer
+            .gather(index, Probe::default())
+            .unwrap_or_else(|error| panic!("{what}: {error}"));
+        let found: Vec<Gathered> = bench.download(BufferId::GatheredOf);
         assert_same_photons(&what, &found, &expected);
 
         let mut recording = Recording::new();
+        recording.fill(BufferId::Status, 0);
         recording.dispatch(StageDesc::new(&shaders::UPDATE, points.len() as u32));
         bench
             .renderer
-            .gpu()
             .run(&recording)
             .unwrap_or_else(|error| panic!("{what}: {error}"));
         let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
         assert_same_statistics(&what, &found, &updated);
     }
     counts(&expected)
-}
-
-/// What a method gathers; like the renderer it takes smaller parts where the driver cuts loops.
-fn gather(bench: &mut Bench, method: &GatherMethod, what: &str) -> Vec<Gathered> {
-    let mut sizes = *bench.renderer.sizes();
-    loop {
-        let mut recording = Recording::new();
-        recording.fill(BufferId::Status, 0);
-        recording.fill(BufferId::GatheredOf, 0);
-        (method.record)(&sizes, &mut recording);
-        bench
-            .renderer
-            .gpu()
-            .run(&recording)
-            .unwrap_or_else(|error| panic!("{what}: {error}"));
-        let status: Vec<StatusCounters> = bench.download(BufferId::Status);
-        if status[0].again & GATHERS_TOO_LONG == 0 {
-            return bench.download(BufferId::GatheredOf);
-        }
-        assert!(
-            sizes.gather_parts < 1024,
-            "{what}: cut even in {} parts",
-            sizes.gather_parts
-        );
-        sizes.gather_parts *= 2;
-    }
 }
 
 fn assert_same_photons(what: &str, found: &[Gathered], expected: &[Gathered]) {
@@ -124,6 +107,79 @@ fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[Statisti
             );
         }
     }
+}
+
+/// Gives the scene so many objects, each of which fills it.
+fn with_objects(count: u32) -> impl FnOnce(&mut PackedScene) {
+    move |scene| {
+        let grid = |object| ObjectGrid {
+            low: [-1.0; 3],
+            inverse_cell: 2.0,
+            cells: [4; 3],
+            first_cell: 64 * object,
+        };
+        scene.object_grids = (0..count).map(grid).collect();
+        scene.object_cells = 64 * count;
+    }
+}
+
+#[test]
+fn all_methods_agree_in_every_scene_at_any_radius_early_and_late() {
+    let mut scenes: Vec<String> = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes"))
+        .expect("scenes")
+        .filter_map(|entry| Some(entry.ok()?.file_name().to_str()?.strip_suffix(".gltf")?.to_owned()))
+        .collect();
+    scenes.sort();
+    assert!(scenes.len() >= 10, "{scenes:?}");
+    for scene in scenes {
+        let config = RenderConfig {
+            resolution: [32, 32],
+            photons: 1501,
+            ..RenderConfig::default()
+        };
+        let mut bench = Bench::new(&scene, config);
+        for iterations in [1, 30] {
+            while bench.renderer.iterations() < iterations {
+                bench.renderer.iterate().expect("an iteration");
+            }
+            let (points, photons): (Vec<VisiblePoint>, _) = (bench.download(BufferId::VisiblePoints), bench.photons());
+            let now: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+            for factor in [0.25f32, 1.0, 4.0] {
+                let scaled = |s: &Statistics| Statistics {
+                    radius2_high: s.radius2_high * factor * factor,
+                    ..*s
+                };
+                let statistics: Vec<Statistics> = now.iter().map(scaled).collect();
+                let case = format!("{scene} after {iterations} iterations, {factor} times the radii");
+                assert_methods_agree(&mut bench, &case, &points, &statistics, &photons);
+            }
+            bench.upload(BufferId::StatisticsOf, &now);
+        }
+    }
+}
+
+#[test]
+fn more_than_ten_thousand_meshes_some_without_photons_or_visible_points_are_told_apart() {
+    const MESHES: u32 = 10_007;
+    let config = RenderConfig {
+        resolution: [64, 64],
+        photons: 4000,
+        radius: Some(0.1),
+        ..small()
+    };
+    let mut bench = Bench::with("cornell", config, with_objects(MESHES));
+    let slots = bench.renderer.sizes().slots();
+    // 4,096 points on 10,007 meshes leave most without one; photons lie on every second mesh.
+    let mesh = |u: f32| (u * MESHES as f32) as u32;
+    let points: Vec<VisiblePoint> = random_numbers(slots)
+        .map(|[x, y, u, _]| visible_point([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], mesh(u)))
+        .collect();
+    let photons: Vec<Photon> = random_numbers(10_001)
+        .map(|[u, x, y, r]| photon([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], mesh(u) & !1, [r, 1.0, 0.5]))
+        .collect();
+    let statistics = with_radius(points.len(), 1.0);
+    let m = assert_methods_agree(&mut bench, "10,007 meshes", &points, &statistics, &photons);
+    assert!(m.contains(&0) && m.contains(&1), "some find none, some find one");
 }
 
 #[test]
@@ -193,7 +249,7 @@ fn no_photon_and_one_photon_are_gathered() {
 
 #[test]
 fn a_photon_at_distance_r_counts_and_the_next_one_beyond_does_not() {
-    let mut bench = Bench::new("cornell", tiny());
+    let mut bench = Bench::with("cornell", tiny(), with_objects(64));
     // Coordinates are multiples of 2⁻²⁰ and 5² = 4² + 3²: f32 holds all distances exactly. Each visible point has an
     // object of its own.
     let grid = |u: f32| ((2.0 * u - 1.0) * 512.0).round() / 1024.0;
@@ -262,4 +318,28 @@ fn more_photons_than_a_loop_may_test_are_all_tested() {
     let statistics = with_radius(points.len(), 9.0);
     let m = assert_methods_agree(&mut bench, "70,001 photons within R", &points, &statistics, &photons);
     assert_eq!(m, vec![70_001; 64]);
+}
+
+#[test]
+fn photons_beyond_a_cells_maximum_are_lost_and_counted() {
+    let config = RenderConfig {
+        cell_photons: Some(100),
+        ..tiny()
+    };
+    let mut bench = Bench::with("cornell", config, with_objects(2));
+    let points = plane(&bench);
+    // Both within a cell of side 0.5 of their object's grid.
+    let photons: Vec<Photon> = random_numbers(1000)
+        .map(|[x, y, ..]| photon([0.1 + 0.1 * x, 0.1 + 0.1 * y, 0.0], 0, [1.0; 3]))
+        .chain([photon([0.7, 0.7, 0.0], 0, [1.0; 3])])
+        .collect();
+    bench.upload(BufferId::VisiblePoints, &points);
+    bench.upload(BufferId::Photons, &photons);
+    bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);
+    bench.upload(BufferId::StatisticsOf, &with_radius(points.len(), 9.0));
+    let method = gather::method("cluster-grid").expect("cluster-grid");
+    let (_, status) = bench.renderer.gather(method, Probe::default()).expect("a gather");
+    assert_eq!((status.lost_photons, status.full_cells), (900, 1));
+    let m = counts(&bench.download::<Gathered>(BufferId::GatheredOf));
+    assert_eq!(m, vec![101; 64], "the cell's first hundred, and the one elsewhere");
 }

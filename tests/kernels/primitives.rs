@@ -93,12 +93,18 @@ fn assert_sorts(device: &mut Device, case: &str, keys: Vec<u32>, capacity: usize
         device.create(id, u64::from(words) * 4).expect("a buffer");
     }
     let mut recording = Recording::new();
-    gather::sort(BufferId::PhotonCount, capacity as u32, bits, &mut recording);
+    let [sorted, _] = gather::sort(
+        BufferId::PhotonCount,
+        capacity as u32,
+        bits,
+        gather::PHOTON_PAIRS,
+        &mut recording,
+    );
     device.run(&recording).expect("a run");
 
     let (mut expected_keys, mut expected_values) = (keys, values);
     cpu::sort(&mut expected_keys, &mut expected_values, bits);
-    for (id, expected) in [(BufferId::Keys, expected_keys), (BufferId::Values, expected_values)] {
+    for (id, expected) in [(sorted.keys, expected_keys), (sorted.values, expected_values)] {
         let found: Vec<u32> = device.download(id, Some(capacity)).expect("a download");
         let difference = first_difference(&found[..count], &expected);
         assert_eq!(

@@ -1,7 +1,7 @@
 //! The stages `reset`, `update` and `resolve`.
 
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Estimator, RenderConfig};
+use ppm_vk::config::{Estimator, RADIUS_GROUPS, RenderConfig};
 use ppm_vk::cpu::{self, Counts};
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{DirectSum, Gathered, NO_OBJECT, Photon, RadiusSum, Statistics, VisiblePoint};
@@ -64,12 +64,13 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     // In runs of 500: each launch has its timestamps.
     let mut recording = Recording::new();
     recording.fill(BufferId::GatheredOf, 0);
+    let (_, naive) = METHODS[0].stages().expect("a method of devices");
     for _ in 0..500 {
-        (METHODS[0].record)(bench.renderer.sizes(), &mut recording);
+        naive(bench.renderer.sizes(), &mut recording);
         recording.dispatch(StageDesc::new(&shaders::UPDATE, 64));
     }
     for _ in 0..ITERATIONS / 500 {
-        bench.renderer.gpu().run(&recording).expect("a run");
+        bench.renderer.run(&recording).expect("a run");
     }
     let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
 
@@ -137,7 +138,7 @@ fn radii_shrink_where_more_photons_than_wanted_were_found() {
     bench.upload(BufferId::StatisticsOf, &statistics);
     let mut recording = Recording::new();
     recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, 64).push(wanted));
-    bench.renderer.gpu().run(&recording).expect("a run");
+    bench.renderer.run(&recording).expect("a run");
 
     let mut expected = statistics.clone();
     cpu::fit_radius(wanted, &mut gathered.clone(), &mut expected);
@@ -169,24 +170,29 @@ fn radii_are_summed_up_and_updates_clear_what_was_gathered() {
     let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
     let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
     let mut recording = Recording::new();
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, points.len() as u32));
-    bench.renderer.gpu().run(&recording).expect("radii");
+    let threads = RADIUS_GROUPS * shaders::GRID_RADII.workgroup;
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, threads).push(RADIUS_GROUPS));
+    bench.renderer.run(&recording).expect("radii");
     let found: Vec<RadiusSum> = bench.download(BufferId::RadiusSums);
-    let expected = cpu::radius_sums(&points, &statistics, shaders::GRID_RADII.workgroup as usize);
+    let size = shaders::GRID_RADII.workgroup as usize;
+    let expected = cpu::radius_sums(&points, &statistics, RADIUS_GROUPS as usize, size);
     assert_eq!(found.len(), expected.len());
     for (group, (found, expected)) in found.iter().zip(&expected).enumerate() {
         assert_eq!(
-            (found.count, found.radius2),
-            (expected.count, expected.radius2),
+            (found.count, found.largest2),
+            (expected.count, expected.largest2),
             "group {group}"
         );
-        let difference = relative_difference(found.radius.into(), expected.radius.into());
-        assert!(
-            difference < 1e-6,
-            "group {group}: ΣR {} on the device, {} on the CPU",
-            found.radius,
-            expected.radius
-        );
+        for (what, found, expected) in [
+            ("ΣR²", found.radius2, expected.radius2),
+            ("Σ1/R²", found.inverse2, expected.inverse2),
+        ] {
+            let difference = relative_difference(found.into(), expected.into());
+            assert!(
+                difference < 1e-6,
+                "group {group}: {what} {found} on the device, {expected} on the CPU"
+            );
+        }
     }
     for (slot, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
         assert_eq!(gathered.flux_count, [0.0; 4], "slot {slot}");

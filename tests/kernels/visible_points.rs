@@ -91,7 +91,7 @@ fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
     let slots = bench.renderer.sizes().slots();
     let constants = vec![("SAMPLE_LIGHTS", u32::from(bench.config.direct == Direct::Light))];
     recording.dispatch(StageDesc::new(&shaders::DIRECT, slots).constants(constants).push(0u32));
-    bench.renderer.gpu().run(&recording).expect("a run");
+    bench.renderer.run(&recording).expect("a run");
     bench.download(BufferId::DirectSums)
 }
 

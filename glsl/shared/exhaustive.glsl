@@ -1,0 +1,51 @@
+// What the gathers share that test every photon, or every photon of a mesh. Include after invocation.glsl and gather.glsl.
+
+// Visible points in the order of PointOrder, whose workgroups have one mesh each; otherwise in that of their slots.
+layout(constant_id = 1) const bool ORDERED = false;
+// Photons sorted by mesh, of which a visible point tests its own mesh's.
+layout(constant_id = 2) const bool BY_MESH = false;
+// Photons beyond R are sorted out by the built-in distance() instead of a squared distance.
+layout(constant_id = 3) const bool DISTANCE = false;
+
+layout(push_constant) uniform Push {
+    uint first;  // the photons of this launch: drivers cut long loops
+    uint end;
+    uint stride; // of the workgroups' visible points only every stride-th is gathered for: 1 but in a bench
+} push;
+
+layout(std430) readonly buffer PhotonCount { uint photon_count; };
+layout(std430) readonly buffer PointOrder { uint point_order[]; };
+layout(std430) readonly buffer MeshEnds { uint mesh_ends[]; }; // one past each mesh's last photon
+
+const uint NO_SLOT = 0xffffffffu;
+
+// Slot of the visible point at a place of this workgroup; NO_SLOT for a filler.
+uint slot_at(uint place) {
+    uint i = workgroup_index() * push.stride * gl_WorkGroupSize.x + place;
+    if (ORDERED) {
+        return i < point_order.length() ? point_order[i] : NO_SLOT;
+    }
+    return i < slots() ? i : NO_SLOT;
+}
+
+// First and end of the photons to test in this launch for a visible point on `object`.
+uvec2 photons_to_test(uint object) {
+    if (object == NO_OBJECT) {
+        return uvec2(0u);
+    }
+    uvec2 range = uvec2(0u, photon_count);
+    if (BY_MESH) {
+        range = uvec2(object == 0u ? 0u : mesh_ends[object - 1u], mesh_ends[object]);
+    }
+    range = uvec2(max(range.x, push.first), min(range.y, push.end));
+    return uvec2(range.x, max(range.x, range.y));
+}
+
+void test(Receiver receiver, float radius, Photon photon, inout Sum sum) {
+    // The built-in rounds as it likes; the margin leaves the last word to the predicate that all methods share.
+    bool far = DISTANCE ? distance(photon.position_object.xyz, receiver.position) > radius * 1.00001 : false;
+    if (!far && accepts(receiver, photon)) {
+        sum.flux += photon.flux_direction.rgb;
+        sum.count += 1u;
+    }
+}

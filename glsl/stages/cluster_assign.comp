@@ -1,0 +1,40 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// k-means: each visible point joins the nearest cluster of its mesh.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "texel.glsl"
+#include "visible_point.glsl"
+#include "clusters.glsl"
+
+uniform usamplerBuffer VisiblePoints;
+uniform usamplerBuffer Centroids;
+layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };
+layout(std430) writeonly buffer ClusterOf { uint cluster_of[]; }; // of each place; NO_SLOT for a filler
+
+void main() {
+    uint place = invocation_index();
+    if (place >= push.runs * RUN) {
+        return;
+    }
+    uint slot = mesh_order[place];
+    uint nearest = NO_SLOT;
+    if (slot != NO_SLOT) {
+        vec4 point = TEXEL(VisiblePoints, 3u * slot);
+        float least = 1e30;
+        uvec2 window = window_of(place / RUN);
+        for (uint run = window.x; run < window.y; run++) {
+            vec4 centre = TEXEL(Centroids, run);
+            vec3 d = centre.xyz - point.xyz;
+            float d2 = dot(d, d);
+            if (floatBitsToUint(centre.w) == floatBitsToUint(point.w) && d2 < least) {
+                least = d2;
+                nearest = run;
+            }
+        }
+    }
+    cluster_of[place] = nearest;
+}

@@ -1,0 +1,39 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// k-means: each cluster moves to the mean of its visible points.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "texel.glsl"
+#include "visible_point.glsl"
+#include "clusters.glsl"
+
+uniform usamplerBuffer VisiblePoints;
+layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };
+layout(std430) readonly buffer ClusterOf { uint cluster_of[]; };
+layout(std430) buffer Centroids { vec4 centroids[]; };
+layout(std430) writeonly buffer ClusterSizes { uint cluster_sizes[]; };
+layout(std430) writeonly buffer ClusterStarts { uint padded_sizes[]; };
+
+void main() {
+    uint cluster = invocation_index();
+    if (cluster >= push.runs) {
+        return;
+    }
+    vec4 before = centroids[cluster];
+    vec3 offset = vec3(0.0);
+    uint count = 0u;
+    uvec2 window = window_of(cluster);
+    for (uint place = window.x * RUN; place < window.y * RUN; place++) {
+        if (cluster_of[place] == cluster) {
+            offset += TEXEL(VisiblePoints, 3u * mesh_order[place]).xyz - before.xyz;
+            count += 1u;
+        }
+    }
+    centroids[cluster] = vec4(before.xyz + offset / float(max(count, 1u)), before.w);
+    cluster_sizes[cluster] = count;
+    // With the fillers that keep a workgroup from holding points of two clusters.
+    padded_sizes[cluster] = (count + RUN - 1u) / RUN * RUN;
+}

@@ -1,0 +1,28 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Puts the visible points cluster by cluster, in the order that they had, with fillers in between.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "clusters.glsl"
+
+layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };
+layout(std430) readonly buffer ClusterOf { uint cluster_of[]; };
+layout(std430) readonly buffer ClusterStarts { uint cluster_starts[]; };
+layout(std430) writeonly buffer PointOrder { uint point_order[]; }; // filled with NO_SLOT before
+
+void main() {
+    uint cluster = invocation_index();
+    if (cluster >= push.runs) {
+        return;
+    }
+    uint next = cluster_starts[cluster];
+    uvec2 window = window_of(cluster);
+    for (uint place = window.x * RUN; place < window.y * RUN; place++) {
+        if (cluster_of[place] == cluster) {
+            point_order[next] = mesh_order[place];
+            next += 1u;
+        }
+    }
+}

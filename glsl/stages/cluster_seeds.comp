@@ -1,0 +1,35 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// k-means: each cluster begins at the mean of its run of visible points.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "texel.glsl"
+#include "visible_point.glsl"
+#include "clusters.glsl"
+
+uniform usamplerBuffer VisiblePoints;
+layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };
+layout(std430) writeonly buffer Centroids { vec4 centroids[]; }; // w: uint bits, mesh; NO_OBJECT for an empty run
+
+void main() {
+    uint run = invocation_index();
+    if (run >= push.runs) {
+        return;
+    }
+    vec4 first = vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT));
+    vec3 offset = vec3(0.0); // from the first point: a sum of positions would cancel
+    uint count = 0u;
+    for (uint i = run * RUN; i < (run + 1u) * RUN; i++) {
+        uint slot = mesh_order[i];
+        if (slot != NO_SLOT) {
+            vec4 position = TEXEL(VisiblePoints, 3u * slot);
+            first = count == 0u ? position : first;
+            offset += position.xyz - first.xyz;
+            count += 1u;
+        }
+    }
+    centroids[run] = vec4(first.xyz + offset / float(max(count, 1u)), first.w);
+}

@@ -1,0 +1,85 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Gathers from the cells of an object's grid that a cluster of visible points reaches: a workgroup's points have one
+// object and lie close together, so all its invocations test the same photons.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "texel.glsl"
+#include "sampling.glsl"
+#include "photon.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+#include "gather.glsl"
+#include "object_grid.glsl"
+#include "status.glsl"
+
+// The part of the sorted photons that this launch looks at.
+layout(push_constant) uniform Push {
+    uint first;
+    uint end;
+} push;
+
+layout(std430) readonly buffer PointOrder { uint point_order[]; };
+layout(std430) readonly buffer ObjectCells { uint cell_starts[]; };
+uniform usamplerBuffer SortedPhotons;
+
+const uint NO_SLOT = 0xffffffffu;
+
+shared vec3 lows[gl_WorkGroupSize.x];
+shared vec3 highs[gl_WorkGroupSize.x];
+
+void main() {
+    uint me = gl_LocalInvocationID.x;
+    uint i = invocation_index();
+    uint slot = i < point_order.length() ? point_order[i] : NO_SLOT;
+    Receiver receiver = NO_RECEIVER;
+    if (slot != NO_SLOT) {
+        receiver = receiver_at(slot);
+    }
+    bool filler = receiver.object == NO_OBJECT;
+    // A little more than R, so that rounding can't leave out the cell of a photon at distance R.
+    float reach = sqrt(max(receiver.radius2, 0.0)) * 1.000001 + 1e-7;
+    lows[me] = filler ? vec3(1e30) : receiver.position - reach;
+    highs[me] = filler ? vec3(-1e30) : receiver.position + reach;
+    for (uint half_size = gl_WorkGroupSize.x / 2u; half_size > 0u; half_size /= 2u) {
+        barrier();
+        if (me < half_size) {
+            lows[me] = min(lows[me], lows[me + half_size]);
+            highs[me] = max(highs[me], highs[me + half_size]);
+        }
+    }
+    barrier();
+    if (filler) {
+        return;
+    }
+    ObjectGrid grid = object_grid(receiver.object);
+    uvec3 low = cell_in(grid, lows[0]);
+    uvec3 high = cell_in(grid, highs[0]);
+    Sum sum = Sum(vec3(0.0), 0u);
+    uint to_test = 0u;
+    uint tested = 0u;
+    for (uint z = low.z; z <= high.z; z++) {
+        for (uint y = low.y; y <= high.y; y++) {
+            // Cells along x follow each other, and so do their photons.
+            uint first = max(cell_starts[cell_number(grid, uvec3(low.x, y, z))], push.first);
+            uint end = min(cell_starts[cell_number(grid, uvec3(high.x, y, z)) + 1u], push.end);
+            to_test += max(end, first) - first;
+            for (uint i = first; i < end; i++) {
+                Photon photon = PHOTON(SortedPhotons, i);
+                tested += 1u;
+                if (accepts(receiver, photon)) {
+                    sum.flux += photon.flux_direction.rgb;
+                    sum.count += 1u;
+                }
+            }
+        }
+    }
+    // Loops that didn't reach their end were cut by the driver: the gather is done again in smaller parts.
+    if (tested != to_test) {
+        atomicOr(status.again, GATHERS_TOO_LONG);
+    }
+    add_gathered(slot, sum, tested);
+}

@@ -1,0 +1,134 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Gathers for clusters of neighbouring visible points: an invocation has a run of them and tests each photon nearby
+// against all, so that a photon is loaded once for as many tests. A run falls into several clusters only where its points
+// lie far apart, as along silhouettes.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "texel.glsl"
+#include "sampling.glsl"
+#include "photon.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+#include "gather.glsl"
+#include "grid.glsl"
+#include "status.glsl"
+
+const uint RUN = 8u; // visible points: 4×2 pixels, see pixel_of
+
+// The part of the sorted photons that this launch looks at.
+layout(push_constant) uniform Push {
+    uint first;
+    uint end;
+} push;
+
+layout(std430) readonly buffer Grid { GridShape grid; };
+uniform usamplerBuffer SortedPhotons;
+uniform usamplerBuffer CellStarts;
+
+uint cell_start(uint bucket) {
+    uvec4 four = TEXEL_BITS(CellStarts, bucket >> 2u);
+    uvec2 two = (bucket & 2u) == 0u ? four.xy : four.zw;
+    return (bucket & 1u) == 0u ? two.x : two.y;
+}
+
+void main() {
+    // Neighbours in a run are neighbours in the picture; a pixel's several points lie in several runs.
+    uint run = invocation_index();
+    uint first_slot = run / settings.slots_per_pixel * RUN * settings.slots_per_pixel + run % settings.slots_per_pixel;
+    if (first_slot >= slots()) {
+        return;
+    }
+    float inverse = grid.inverse_cell_size;
+    Receiver receivers[RUN];
+    ivec3 lows[RUN];
+    ivec3 highs[RUN];
+    Sum sums[RUN];
+    uint tested_for[RUN];
+    bool pending[RUN];
+    bool any_pending = false;
+    for (uint k = 0u; k < RUN; k++) {
+        receivers[k] = receiver_at(first_slot + k * settings.slots_per_pixel);
+        // A little more than R, so that rounding can't leave out the cell of a photon at distance R.
+        float reach = sqrt(receivers[k].radius2) * 1.000001 + 1e-7;
+        lows[k] = cell_of(receivers[k].position - reach, inverse);
+        highs[k] = cell_of(receivers[k].position + reach, inverse);
+        sums[k] = Sum(vec3(0.0), 0u);
+        tested_for[k] = 0u;
+        pending[k] = receivers[k].object != NO_OBJECT;
+        any_pending = any_pending || pending[k];
+    }
+    uint to_test = 0u;
+    uint tested = 0u;
+    while (any_pending) {
+        // The first point that is left, and those whose cells reach no more than one farther than it or they do alone.
+        any_pending = false;
+        bool chosen = false;
+        ivec3 low = ivec3(0);
+        ivec3 high = ivec3(-1);
+        Receiver cluster[RUN];
+        for (uint k = 0u; k < RUN; k++) {
+            bool leads = pending[k] && !chosen;
+            ivec3 new_low = leads ? lows[k] : min(low, lows[k]);
+            ivec3 new_high = leads ? highs[k] : max(high, highs[k]);
+            ivec3 extent = max(high - low, highs[k] - lows[k]);
+            bool joins = leads || (pending[k] && all(lessThanEqual(new_high - new_low, extent + 1)));
+            low = joins ? new_low : low;
+            high = joins ? new_high : high;
+            cluster[k] = receivers[k];
+            cluster[k].radius2 = joins ? receivers[k].radius2 : -1.0;
+            chosen = chosen || leads;
+            pending[k] = pending[k] && !joins;
+            any_pending = any_pending || pending[k];
+        }
+        uint tested_before = tested;
+        ivec3 first_row = row_of(low);
+        ivec3 last_row = row_of(high);
+        ivec3 row = first_row;
+        bool more;
+        // Loops that test at their end: some drivers carry out a loop's body once more than its condition holds.
+        do {
+            uint bucket = bucket_of_row(row);
+            int row_begin = row.x << ROW_BITS;
+            uint from = bucket + uint(max(low.x - row_begin, 0));
+            uint past = bucket + uint(min(high.x + 1 - row_begin, 1 << ROW_BITS));
+            uint i = max(cell_start(from), push.first);
+            uint end = min(cell_start(past), push.end);
+            to_test += max(end, i) - i;
+            do {
+                Photon photon = PHOTON(SortedPhotons, i);
+                // Rows that share a bucket must not be counted twice.
+                bool here = i < end && row_of(cell_of(photon.position_object.xyz, inverse)) == row;
+                for (uint k = 0u; k < RUN; k++) {
+                    bool accepted = here && accepts(cluster[k], photon);
+                    sums[k].flux += accepted ? photon.flux_direction.rgb : vec3(0.0);
+                    sums[k].count += accepted ? 1u : 0u;
+                }
+                tested += i < end ? 1u : 0u;
+                i += 1u;
+            } while (i < end);
+            bool end_x = row.x == last_row.x;
+            bool end_y = end_x && row.y == last_row.y;
+            more = !(end_y && row.z == last_row.z);
+            row = ivec3(end_x ? first_row.x : row.x + 1, end_y ? first_row.y : row.y + (end_x ? 1 : 0),
+                        row.z + (end_y ? 1 : 0));
+        } while (more);
+        if (COUNT_TESTS) {
+            for (uint k = 0u; k < RUN; k++) {
+                tested_for[k] += cluster[k].radius2 >= 0.0 ? tested - tested_before : 0u;
+            }
+        }
+    }
+    // Loops that didn't reach their end were cut by the driver: the gather is done again in smaller parts.
+    if (tested != to_test || any_pending) {
+        atomicOr(status.again, GATHERS_TOO_LONG);
+    }
+    for (uint k = 0u; k < RUN; k++) {
+        if (receivers[k].object != NO_OBJECT) {
+            add_gathered(first_slot + k * settings.slots_per_pixel, sums[k], tested_for[k]);
+        }
+    }
+}

@@ -1,0 +1,51 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Gathers from blocks of photons that a workgroup stages through its shared memory (the paper's local memory).
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "texel.glsl"
+#include "sampling.glsl"
+#include "photon.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+#include "gather.glsl"
+#include "exhaustive.glsl"
+
+uniform usamplerBuffer GatheredFrom;
+
+shared Photon block[gl_WorkGroupSize.x];
+
+void main() {
+    uint me = gl_LocalInvocationID.x;
+    uint slot = slot_at(me);
+    Receiver receiver = NO_RECEIVER;
+    if (slot != NO_SLOT) {
+        receiver = receiver_at(slot);
+    }
+    // The whole workgroup stages the same photons: all, or those of the mesh of its first visible point and so of all.
+    uint object = 0u;
+    if (BY_MESH) {
+        uint first_slot = slot_at(0u);
+        object = first_slot == NO_SLOT ? NO_OBJECT : floatBitsToUint(TEXEL(VisiblePoints, 3u * first_slot).w);
+    }
+    uvec2 range = photons_to_test(object);
+    float radius = sqrt(max(receiver.radius2, 0.0));
+    Sum sum = Sum(vec3(0.0), 0u);
+    for (uint first = range.x; first < range.y; first += gl_WorkGroupSize.x) {
+        if (first + me < range.y) {
+            block[me] = PHOTON(GatheredFrom, first + me);
+        }
+        barrier();
+        uint count = min(range.y - first, gl_WorkGroupSize.x);
+        for (uint i = 0u; i < count; i++) {
+            test(receiver, radius, block[i], sum);
+        }
+        barrier();
+    }
+    if (receiver.object != NO_OBJECT) {
+        add_gathered(slot, sum, range.y - range.x);
+    }
+}

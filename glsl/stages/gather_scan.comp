@@ -1,0 +1,33 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Gathers by testing photons one after the other: all of them (the paper's naive hitpoint illumination), or those of the
+// visible point's mesh.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "texel.glsl"
+#include "sampling.glsl"
+#include "photon.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+#include "gather.glsl"
+#include "exhaustive.glsl"
+
+uniform usamplerBuffer GatheredFrom;
+
+void main() {
+    uint slot = slot_at(gl_LocalInvocationID.x);
+    if (push.first >= photon_count || slot == NO_SLOT) {
+        return;
+    }
+    Receiver receiver = receiver_at(slot);
+    uvec2 range = photons_to_test(receiver.object);
+    float radius = sqrt(receiver.radius2);
+    Sum sum = Sum(vec3(0.0), 0u);
+    for (uint i = range.x; i < range.y; i++) {
+        test(receiver, radius, PHOTON(GatheredFrom, i), sum);
+    }
+    add_gathered(slot, sum, range.y - range.x);
+}

@@ -1,0 +1,21 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Puts the photons into the order of their buckets; those of a bucket keep the order that they had.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "texel.glsl"
+#include "photon.glsl"
+
+layout(std430) readonly buffer ValuesIn { uint values[]; };
+uniform usamplerBuffer Photons;
+layout(std430) readonly buffer PhotonCount { uint photon_count; };
+layout(std430) writeonly buffer SortedPhotons { Photon sorted_photons[]; };
+
+void main() {
+    uint i = invocation_index();
+    if (i < photon_count) {
+        sorted_photons[i] = PHOTON(Photons, values[i]);
+    }
+}

@@ -1,0 +1,19 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The paper's photon sorting, first stage: how many photons lie on each mesh.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "texel.glsl"
+
+uniform usamplerBuffer Photons;
+layout(std430) readonly buffer PhotonCount { uint photon_count; };
+layout(std430) buffer MeshEnds { uint mesh_ends[]; }; // cleared before
+
+void main() {
+    uint i = invocation_index();
+    if (i < photon_count) {
+        atomicAdd(mesh_ends[TEXEL_BITS(Photons, 2u * i).w], 1u);
+    }
+}

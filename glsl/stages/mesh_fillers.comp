@@ -1,0 +1,22 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The paper's filler hitpoints: how many each mesh needs so that its last workgroup is full.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+
+layout(push_constant) uniform Push {
+    uint meshes;
+    uint group; // visible points of a workgroup
+} push;
+
+layout(std430) buffer MeshFillers { uint mesh_fillers[]; }; // before: visible points of each mesh
+
+void main() {
+    uint mesh = invocation_index();
+    if (mesh < push.meshes) {
+        uint points = mesh_fillers[mesh];
+        mesh_fillers[mesh] = (push.group - points % push.group) % push.group;
+    }
+}

@@ -1,0 +1,23 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The paper's photon sorting, last stage: each photon takes the next place of its mesh from an atomic counter. Photons of
+// a mesh come in any order, another one each run.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "texel.glsl"
+#include "photon.glsl"
+
+uniform usamplerBuffer Photons;
+layout(std430) readonly buffer PhotonCount { uint photon_count; };
+layout(std430) buffer MeshEnds { uint mesh_ends[]; }; // first each mesh's first place, in the end its end
+layout(std430) writeonly buffer SortedPhotons { Photon sorted_photons[]; };
+
+void main() {
+    uint i = invocation_index();
+    if (i < photon_count) {
+        Photon photon = PHOTON(Photons, i);
+        sorted_photons[atomicAdd(mesh_ends[floatBitsToUint(photon.position_object.w)], 1u)] = photon;
+    }
+}

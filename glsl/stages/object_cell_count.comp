@@ -1,0 +1,22 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The paper's grid of each object: how many photons lie in each cell.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "texel.glsl"
+#include "object_grid.glsl"
+
+uniform usamplerBuffer Photons;
+layout(std430) readonly buffer PhotonCount { uint photon_count; };
+layout(std430) buffer ObjectCells { uint cell_photons[]; }; // cleared before
+
+void main() {
+    uint i = invocation_index();
+    if (i < photon_count) {
+        vec4 position_object = TEXEL(Photons, 2u * i);
+        ObjectGrid grid = object_grid(floatBitsToUint(position_object.w));
+        atomicAdd(cell_photons[cell_number(grid, cell_in(grid, position_object.xyz))], 1u);
+    }
+}

@@ -1,0 +1,32 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The paper's grid of each object: each photon takes the next place of its cell from an atomic counter. Photons of a cell
+// come in any order, another one each run.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "texel.glsl"
+#include "photon.glsl"
+#include "object_grid.glsl"
+
+uniform usamplerBuffer Photons;
+layout(std430) readonly buffer PhotonCount { uint photon_count; };
+layout(std430) readonly buffer ObjectCells { uint cell_starts[]; };
+layout(std430) buffer ObjectCellCursors { uint cursors[]; }; // cleared before
+layout(std430) writeonly buffer SortedPhotons { Photon sorted_photons[]; };
+
+void main() {
+    uint i = invocation_index();
+    if (i >= photon_count) {
+        return;
+    }
+    Photon photon = PHOTON(Photons, i);
+    ObjectGrid grid = object_grid(floatBitsToUint(photon.position_object.w));
+    uint cell = cell_number(grid, cell_in(grid, photon.position_object.xyz));
+    uint place = cell_starts[cell] + atomicAdd(cursors[cell], 1u);
+    // A full cell has no place left.
+    if (place < cell_starts[cell + 1u]) {
+        sorted_photons[place] = photon;
+    }
+}

@@ -1,0 +1,41 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Ordering of visible points: keys are their meshes; counts how many each mesh has.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "texel.glsl"
+#include "visible_point.glsl"
+
+// Whether the points have an order already, which equal keys are to keep.
+layout(constant_id = 0) const bool PRESORTED = false;
+
+layout(push_constant) uniform Push {
+    uint meshes;
+} push;
+
+uniform usamplerBuffer VisiblePoints;
+layout(std430) writeonly buffer KeysOut { uint keys[]; };
+layout(std430) buffer ValuesOut { uint values[]; };
+layout(std430) buffer MeshFillers { uint mesh_points[]; }; // cleared before
+layout(std430) writeonly buffer PointCount { uint point_count; };
+
+void main() {
+    uint i = invocation_index();
+    if (i >= slots()) {
+        return;
+    }
+    if (i == 0u) {
+        point_count = slots();
+    }
+    uint slot = PRESORTED ? values[i] : i;
+    uint object = floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w);
+    // Slots without a visible point come last.
+    keys[i] = min(object, push.meshes);
+    values[i] = slot;
+    if (object != NO_OBJECT) {
+        atomicAdd(mesh_points[object], 1u);
+    }
+}

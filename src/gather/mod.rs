@@ -1,0 +1,176 @@
+//! The table of gather methods. Command line, tests, bench and reports iterate over [`METHODS`].
+
+mod photons;
+mod points;
+mod primitives;
+
+pub use primitives::{PHOTON_PAIRS, POINT_PAIRS, Pairs, scan, sort};
+
+use crate::config::Sizes;
+use crate::record::Recording;
+
+/// Records stages for buffers of these sizes.
+pub type Record = fn(&Sizes, &mut Recording);
+
+/// A way to find, for each visible point, the photons within its radius.
+pub struct GatherMethod {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What it does, in one line.
+    pub summary: &'static str,
+    /// The paper's row that it is, or where it comes from.
+    pub paper: &'static str,
+    /// What it runs.
+    pub runs: Runs,
+}
+
+/// What a gather method runs.
+#[derive(Clone, Copy)]
+pub enum Runs {
+    /// Stages of a Vulkan device.
+    Device {
+        /// Ordering visible points, when they are new.
+        order: Record,
+        /// Ordering a batch's photons, and gathering them.
+        gather: Record,
+        /// How many photons a visible point tests.
+        tests: Tests,
+    },
+    /// A kd-tree on the CPU.
+    CpuKdTree,
+    /// Testing each photon on the CPU.
+    CpuNaive,
+}
+
+/// How many photons a visible point tests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tests {
+    /// All of them, or all on its mesh.
+    All,
+    /// Those nearby.
+    Near,
+}
+
+impl GatherMethod {
+    /// The stages that it runs; `None` if it runs on the CPU.
+    pub fn stages(&self) -> Option<(Record, Record)> {
+        match self.runs {
+            Runs::Device { order, gather, .. } => Some((order, gather)),
+            Runs::CpuKdTree | Runs::CpuNaive => None,
+        }
+    }
+}
+
+const fn exhaustive(order: Record, gather: Record) -> Runs {
+    Runs::Device {
+        order,
+        gather,
+        tests: Tests::All,
+    }
+}
+
+const fn near(order: Record, gather: Record) -> Runs {
+    Runs::Device {
+        order,
+        gather,
+        tests: Tests::Near,
+    }
+}
+
+/// Every method, in the order of the paper's ladder.
+pub const METHODS: &[GatherMethod] = &[
+    GatherMethod {
+        name: "naive",
+        summary: "every visible point tests every photon",
+        paper: "tables 1 to 3, «Naive solution»",
+        runs: exhaustive(points::by_slot, photons::naive),
+    },
+    GatherMethod {
+        name: "naive-distance",
+        summary: "the same by the built-in distance() instead of a squared distance",
+        paper: "section 8, distance() against manual calculation",
+        runs: exhaustive(points::by_slot, photons::naive_distance),
+    },
+    GatherMethod {
+        name: "local",
+        summary: "blocks of photons staged through shared memory",
+        paper: "table 3, «Local memory»",
+        runs: exhaustive(points::by_slot, photons::local),
+    },
+    GatherMethod {
+        name: "photon-sort",
+        summary: "photons sorted by mesh with atomic counters; a visible point tests its mesh's",
+        paper: "table 3, «Photon sorting»",
+        runs: exhaustive(points::by_slot, photons::mesh),
+    },
+    GatherMethod {
+        name: "hitpoint-sort",
+        summary: "visible points sorted by mesh too, with fillers so that no workgroup spans two",
+        paper: "table 3, «Hitpoint sorting»",
+        runs: exhaustive(points::by_mesh, photons::ordered_mesh),
+    },
+    GatherMethod {
+        name: "hitpoint-sort-local-distance",
+        summary: "the same through shared memory, by the built-in distance()",
+        paper: "table 3, «Hitpoint sorting, local memory»",
+        runs: exhaustive(points::by_mesh, photons::ordered_mesh_local_distance),
+    },
+    GatherMethod {
+        name: "hitpoint-sort-local",
+        summary: "the same through shared memory, by a squared distance",
+        paper: "section 8, 125 ms and 1 941 ms; table 4, «Hitpoint sorting, local memory»",
+        runs: exhaustive(points::by_mesh, photons::ordered_mesh_local),
+    },
+    GatherMethod {
+        name: "cluster",
+        summary: "visible points in k-means clusters within their mesh, with fillers; shared memory",
+        paper: "section 8, clusters without a grid (33 % fillers)",
+        runs: exhaustive(points::by_cluster, photons::ordered_mesh_local),
+    },
+    GatherMethod {
+        name: "cluster-grid",
+        summary: "the clusters, and a grid for each object whose cells are sorted with atomic counters",
+        paper: "table 4, «Grid structure»",
+        runs: near(points::by_cluster, photons::object_grids),
+    },
+    GatherMethod {
+        name: "clustered",
+        summary: "runs of neighbouring visible points share what they load from rows of a hashed grid",
+        paper: "beyond the paper",
+        runs: near(points::by_slot, photons::hashed_grid),
+    },
+    GatherMethod {
+        name: "cpu-kdtree",
+        summary: "a kd-tree on the CPU, all threads (--backend cpu)",
+        paper: "tables 1 and 2, column «CPU»",
+        runs: Runs::CpuKdTree,
+    },
+    GatherMethod {
+        name: "cpu-naive",
+        summary: "every visible point tests every photon on the CPU, all threads (--backend cpu)",
+        paper: "section 6, 68 seconds",
+        runs: Runs::CpuNaive,
+    },
+];
+
+/// Index of the method named `name`.
+pub fn method(name: &str) -> Option<usize> {
+    METHODS.iter().position(|method| method.name == name)
+}
+
+/// The method that is fastest on a Vulkan device.
+pub fn default_method() -> usize {
+    let is_default = |method: &GatherMethod| method.name == "clustered";
+    METHODS.iter().position(is_default).unwrap_or_default()
+}
+
+/// The method that is fastest on the CPU.
+pub fn default_cpu_method() -> usize {
+    let is_default = |method: &GatherMethod| matches!(method.runs, Runs::CpuKdTree);
+    METHODS.iter().position(is_default).unwrap_or_default()
+}
+
+/// Whether this stage gathers, rather than preparing it.
+pub fn is_gather_stage(stage: &str) -> bool {
+    stage.starts_with("gather_")
+}

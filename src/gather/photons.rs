@@ -1,0 +1,177 @@
+//! Orders of photons, and gathering from them: what is recorded for each batch of photons.
+
+use super::primitives::{PHOTON_PAIRS, scan, sort};
+use crate::config::{CLUSTERED_RUN, EXHAUSTIVE_RANGE, GROUP, RADIUS_GROUPS, Sizes};
+use crate::record::Recording;
+use crate::shaders;
+use crate::stage::{BufferId, Shader, StageDesc};
+
+/// How a gather that tests every photon goes about it.
+#[derive(Default, Clone, Copy)]
+struct Exhaustive {
+    /// Stages blocks of photons through shared memory.
+    local: bool,
+    /// Has photons sorted by mesh and tests those of the visible point's mesh alone.
+    by_mesh: bool,
+    /// Has an order of visible points whose workgroups have one mesh each.
+    ordered: bool,
+    /// Uses the built-in distance().
+    distance: bool,
+}
+
+/// Every photon.
+pub fn naive(sizes: &Sizes, recording: &mut Recording) {
+    Exhaustive::default().record(sizes, recording);
+}
+
+/// Every photon, by the built-in distance().
+pub fn naive_distance(sizes: &Sizes, recording: &mut Recording) {
+    let how = Exhaustive {
+        distance: true,
+        ..Exhaustive::default()
+    };
+    how.record(sizes, recording);
+}
+
+/// Every photon, through shared memory.
+pub fn local(sizes: &Sizes, recording: &mut Recording) {
+    let how = Exhaustive {
+        local: true,
+        ..Exhaustive::default()
+    };
+    how.record(sizes, recording);
+}
+
+/// The mesh's photons.
+pub fn mesh(sizes: &Sizes, recording: &mut Recording) {
+    let how = Exhaustive {
+        by_mesh: true,
+        ..Exhaustive::default()
+    };
+    how.record(sizes, recording);
+}
+
+/// The mesh's photons, for visible points in an order.
+pub fn ordered_mesh(sizes: &Sizes, recording: &mut Recording) {
+    let how = Exhaustive {
+        by_mesh: true,
+        ordered: true,
+        ..Exhaustive::default()
+    };
+    how.record(sizes, recording);
+}
+
+/// The mesh's photons, for visible points in an order, through shared memory.
+pub fn ordered_mesh_local(sizes: &Sizes, recording: &mut Recording) {
+    let how = Exhaustive {
+        by_mesh: true,
+        ordered: true,
+        local: true,
+        distance: false,
+    };
+    how.record(sizes, recording);
+}
+
+/// The same by the built-in distance().
+pub fn ordered_mesh_local_distance(sizes: &Sizes, recording: &mut Recording) {
+    let how = Exhaustive {
+        by_mesh: true,
+        ordered: true,
+        local: true,
+        distance: true,
+    };
+    how.record(sizes, recording);
+}
+
+impl Exhaustive {
+    fn record(self, sizes: &Sizes, recording: &mut Recording) {
+        if self.by_mesh {
+            sort_by_mesh(sizes, recording);
+        }
+        let from = if self.by_mesh {
+            BufferId::SortedPhotons
+        } else {
+            BufferId::Photons
+        };
+        let shader = if self.local {
+            &shaders::GATHER_LOCAL
+        } else {
+            &shaders::GATHER_SCAN
+        };
+        let groups = if self.ordered {
+            sizes.order_groups()
+        } else {
+            sizes.slots().div_ceil(GROUP)
+        };
+        let stride = sizes.probe.stride;
+        let photons = sizes.photon_capacity();
+        for first in (0..photons).step_by(EXHAUSTIVE_RANGE as usize) {
+            let push = [first, first.saturating_add(EXHAUSTIVE_RANGE), stride];
+            let stage = gather_stage(shader, groups.div_ceil(stride) * GROUP, sizes).push(push);
+            let mut constants = stage.constants.to_vec();
+            constants.extend([
+                ("ORDERED", u32::from(self.ordered)),
+                ("BY_MESH", u32::from(self.by_mesh)),
+                ("DISTANCE", u32::from(self.distance)),
+            ]);
+            recording.dispatch(stage.constants(constants).bind(vec![(BufferId::GatheredFrom, from)]));
+        }
+    }
+}
+
+fn gather_stage(shader: &'static Shader, threads: u32, sizes: &Sizes) -> StageDesc {
+    StageDesc::new(shader, threads).constants(vec![("COUNT_TESTS", u32::from(sizes.probe.count_tests))])
+}
+
+/// The paper's photon sorting: one map a mesh, filled by an atomic counter a mesh.
+fn sort_by_mesh(sizes: &Sizes, recording: &mut Recording) {
+    let photons = sizes.photon_capacity();
+    recording.fill(BufferId::MeshEnds, 0);
+    recording.dispatch(StageDesc::new(&shaders::MESH_COUNT, photons));
+    scan(BufferId::MeshEnds, sizes.meshes, recording);
+    recording.dispatch(StageDesc::new(&shaders::MESH_SCATTER, photons));
+}
+
+/// The cells of the objects' grids that a cluster reaches.
+pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
+    let (photons, cells) = (sizes.photon_capacity(), sizes.object_cells);
+    recording.fill(BufferId::ObjectCells, 0);
+    recording.dispatch(StageDesc::new(&shaders::OBJECT_CELL_COUNT, photons));
+    if let Some(maximum) = sizes.cell_photons {
+        recording.dispatch(StageDesc::new(&shaders::OBJECT_CELL_LIMIT, cells).push([cells, maximum]));
+    }
+    scan(BufferId::ObjectCells, cells + 1, recording);
+    recording.fill(BufferId::ObjectCellCursors, 0);
+    recording.dispatch(StageDesc::new(&shaders::OBJECT_CELL_SCATTER, photons));
+    in_parts(
+        &shaders::GATHER_CLUSTER_GRID,
+        sizes.order_groups() * GROUP,
+        sizes,
+        recording,
+    );
+}
+
+/// The cells of a hashed grid that a few neighbouring visible points reach.
+pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
+    let photons = sizes.photon_capacity();
+    let radius_threads = RADIUS_GROUPS * shaders::GRID_RADII.workgroup;
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, radius_threads).push(RADIUS_GROUPS));
+    recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup).push(RADIUS_GROUPS));
+    recording.fill(BufferId::CellStarts, 0);
+    recording.dispatch(StageDesc::new(&shaders::GRID_KEYS, photons));
+    scan(BufferId::CellStarts, (1 << sizes.cell_bits) + 1, recording);
+    let [sorted, _] = sort(BufferId::PhotonCount, photons, sizes.cell_bits, PHOTON_PAIRS, recording);
+    let values = vec![(BufferId::ValuesIn, sorted.values)];
+    recording.dispatch(StageDesc::new(&shaders::GRID_PHOTONS, photons).bind(values));
+    let runs = sizes.slots().div_ceil(CLUSTERED_RUN);
+    in_parts(&shaders::GATHER_CLUSTERED, runs, sizes, recording);
+}
+
+/// A gather that looks at the sorted photons part by part: all at once unless the driver cuts its loops.
+fn in_parts(shader: &'static Shader, threads: u32, sizes: &Sizes, recording: &mut Recording) {
+    let photons = sizes.photon_capacity();
+    let part = photons.div_ceil(sizes.gather_parts);
+    for first in (0..photons).step_by(part as usize) {
+        recording.dispatch(gather_stage(shader, threads, sizes).push([first, first.saturating_add(part)]));
+    }
+}

@@ -1,0 +1,91 @@
+//! Prefix sums and sorting, which every ordering on the device is made of.
+
+use crate::config::{SCAN_BLOCK, SORT_DIGIT_BITS, SORT_TILE};
+use crate::record::Recording;
+use crate::shaders;
+use crate::stage::{BufferId, StageDesc};
+
+/// Records the exclusive prefix sums of the first `count` numbers of `buffer`, in place. Their total goes to
+/// [`BufferId::ScanTotal`].
+pub fn scan(buffer: BufferId, count: u32, recording: &mut Recording) {
+    let bound = [(BufferId::Scan, buffer)];
+    let blocks = count.div_ceil(SCAN_BLOCK);
+    let threads = blocks * shaders::SCAN_BLOCKS.workgroup;
+    recording.dispatch(
+        StageDesc::new(&shaders::SCAN_BLOCKS, threads)
+            .push(count)
+            .bind(bound.to_vec()),
+    );
+    recording.dispatch(StageDesc::new(&shaders::SCAN_SUMS, shaders::SCAN_SUMS.workgroup).push(blocks));
+    recording.dispatch(
+        StageDesc::new(&shaders::SCAN_ADD, count)
+            .push(count)
+            .bind(bound.to_vec()),
+    );
+}
+
+/// Keys and the values that are sorted along with them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pairs {
+    /// u32 each.
+    pub keys: BufferId,
+    /// u32 each.
+    pub values: BufferId,
+}
+
+/// Keys and values of photons, and where they go every other pass.
+pub const PHOTON_PAIRS: [Pairs; 2] = [
+    Pairs {
+        keys: BufferId::Keys,
+        values: BufferId::Values,
+    },
+    Pairs {
+        keys: BufferId::OtherKeys,
+        values: BufferId::OtherValues,
+    },
+];
+
+/// Keys and values of visible points, and where they go every other pass.
+pub const POINT_PAIRS: [Pairs; 2] = [
+    Pairs {
+        keys: BufferId::PointKeys,
+        values: BufferId::PointValues,
+    },
+    Pairs {
+        keys: BufferId::OtherPointKeys,
+        values: BufferId::OtherPointValues,
+    },
+];
+
+/// Records a stable sort of `pairs[0]` by the low `bits` bits of the keys, back and forth between the two. `capacity` is
+/// the most pairs that there can be; how many there are stands in the buffer `count`. Returns the two with the sorted one
+/// first.
+pub fn sort(count: BufferId, capacity: u32, bits: u32, pairs: [Pairs; 2], recording: &mut Recording) -> [Pairs; 2] {
+    let tiles = capacity.div_ceil(SORT_TILE);
+    let [mut here, mut there] = pairs;
+    for pass in 0..bits.div_ceil(SORT_DIGIT_BITS) {
+        let push = [pass * SORT_DIGIT_BITS, tiles];
+        let bound = vec![
+            (BufferId::SortCount, count),
+            (BufferId::KeysIn, here.keys),
+            (BufferId::ValuesIn, here.values),
+            (BufferId::KeysOut, there.keys),
+            (BufferId::ValuesOut, there.values),
+        ];
+        let count_threads = tiles * shaders::SORT_COUNT.workgroup;
+        recording.dispatch(
+            StageDesc::new(&shaders::SORT_COUNT, count_threads)
+                .push(push)
+                .bind(bound.clone()),
+        );
+        scan(BufferId::Histograms, tiles << SORT_DIGIT_BITS, recording);
+        let scatter_threads = tiles * shaders::SORT_SCATTER.workgroup;
+        recording.dispatch(
+            StageDesc::new(&shaders::SORT_SCATTER, scatter_threads)
+                .push(push)
+                .bind(bound),
+        );
+        std::mem::swap(&mut here, &mut there);
+    }
+    [here, there]
+}
