@@ -8,6 +8,7 @@ macro_rules! say {
 }
 
 mod args;
+mod bench;
 mod interrupt;
 mod list;
 mod progress;
@@ -38,6 +39,7 @@ pub fn run() -> Result<Outcome> {
     match arguments.command {
         None => render::render(&arguments.render),
         Some(Command::Devices { json }) => print(&list::devices(json)?),
+        Some(Command::Bench(args::Bench::Gather(arguments))) => bench::gather(&arguments),
         Some(Command::Gathers) => print(&list::gathers()?),
         Some(Command::Inspect { scene, json }) => print(&list::inspect(&scene, json)?),
     }

@@ -160,6 +160,8 @@ pub struct Sizes {
     pub photon_lanes: u32,
     /// Photons that one of them can store.
     pub lane_capacity: u32,
+    /// Photons that a batch can store.
+    pub photon_capacity: u32,
     /// log2 of the grid's buckets.
     pub cell_bits: u32,
     /// Launches among which a gather's photons are dealt: 1 unless the driver cuts its loops.
@@ -209,6 +211,11 @@ pub struct Limits {
     pub object_cells: u32,
 }
 
+/// A quarter more, and some.
+fn with_room(need: u32) -> u32 {
+    need.saturating_add(need / 4 + 64)
+}
+
 /// Photons that a path leaves behind on average; more are noticed and make the buffers grow.
 const EXPECTED_PHOTONS: f64 = 5.0;
 
@@ -234,8 +241,9 @@ impl Sizes {
             batch_paths,
             photon_lanes: 0,
             lane_capacity: 0,
+            photon_capacity: 0,
             gather_parts: 1,
-            cell_bits: (batch_paths.ilog2() + 4).clamp(12, 24),
+            cell_bits: (batch_paths.ilog2() + 3).clamp(12, 24),
             meshes: limits.meshes,
             object_cells: limits.object_cells,
             cell_photons: config.cell_photons,
@@ -251,6 +259,24 @@ impl Sizes {
         let paths = f64::from(self.paths_per_lane());
         // Mean and a few standard deviations of a sum of geometrically distributed lengths.
         self.lane_capacity = (EXPECTED_PHOTONS * (paths + 3.0 * paths.sqrt())).ceil() as u32;
+        self.photon_capacity = self.lane_photons();
+    }
+
+    /// Makes the photons' buffers fit what a batch was seen to need, with room for chance: kernels have an invocation for
+    /// each place.
+    pub fn fit(&mut self, lane_need: u32, batch_need: u32) {
+        self.lane_capacity = self.lane_capacity.min(lane_need + lane_need / 2 + 8);
+        self.photon_capacity = with_room(batch_need).min(self.lane_photons());
+    }
+
+    /// Makes room for what didn't fit.
+    pub fn grow(&mut self, lane_need: u32, batch_need: u32) {
+        if lane_need > self.lane_capacity {
+            self.lane_capacity = with_room(lane_need);
+        }
+        if batch_need > self.photon_capacity {
+            self.photon_capacity = with_room(batch_need);
+        }
     }
 
     /// Takes fewer photon paths at once until the photons of a batch fit into one buffer.
@@ -264,6 +290,7 @@ impl Sizes {
             self.photon_lanes = self.batch_paths.div_ceil(paths);
             self.lane_capacity = capacity;
         }
+        self.photon_capacity = self.photon_capacity.min(self.lane_photons());
     }
 
     /// Photon paths that an invocation follows one after the other, at the most.
@@ -275,7 +302,7 @@ impl Sizes {
     pub fn bytes(&self, id: BufferId) -> Option<u64> {
         let pixels = u64::from(self.resolution[0]) * u64::from(self.resolution[1]);
         let slots = u64::from(self.slots());
-        let photons = u64::from(self.photon_lanes) * u64::from(self.lane_capacity);
+        let photons = u64::from(self.photon_capacity);
         let lanes = u64::from(self.photon_lanes);
         let tiles = photons.max(slots).div_ceil(u64::from(SORT_TILE));
         let histograms = tiles << SORT_DIGIT_BITS;
@@ -295,7 +322,8 @@ impl Sizes {
             BufferId::Status => (1, size_of::<StatusCounters>()),
             BufferId::Grid => (1, size_of::<GridShape>()),
             BufferId::PhotonCount | BufferId::PointCount | BufferId::ScanTotal => (1, 4),
-            BufferId::LanePhotons | BufferId::Photons | BufferId::SortedPhotons => (photons, size_of::<Photon>()),
+            BufferId::LanePhotons => (u64::from(self.lane_photons()), size_of::<Photon>()),
+            BufferId::Photons | BufferId::SortedPhotons => (photons, size_of::<Photon>()),
             BufferId::LaneCounts | BufferId::LaneOffsets => (lanes, 4),
             BufferId::Keys | BufferId::Values | BufferId::OtherKeys | BufferId::OtherValues => (photons, 4),
             BufferId::PointKeys | BufferId::PointValues | BufferId::OtherPointKeys | BufferId::OtherPointValues => {
@@ -332,8 +360,8 @@ impl Sizes {
         self.pixel_slots * self.slots_per_pixel
     }
 
-    /// Photons that a batch can store.
-    pub fn photon_capacity(&self) -> u32 {
+    /// Photons that the lanes can store.
+    pub fn lane_photons(&self) -> u32 {
         self.photon_lanes.saturating_mul(self.lane_capacity)
     }
 

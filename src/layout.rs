@@ -235,9 +235,11 @@ device_structs! {
     }
 
     /// What the stages report to the host.
-    pub struct StatusCounters: 36 {
+    pub struct StatusCounters: 40 {
         /// Most photons that one lane had to store.
         pub lane_need: u32,
+        /// Most photons of a batch.
+        pub batch_need: u32,
         /// Paths ended by the bounce limit.
         pub truncated_paths: u32,
         /// Paths ended by the driver's loop limit.

@@ -79,7 +79,7 @@ impl Stages<'_> {
         let lanes = self.sizes.photon_lanes;
         recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([iteration, first, paths]));
         scan(BufferId::LaneOffsets, lanes, recording);
-        recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.photon_capacity()));
+        recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.lane_photons()));
     }
 
     /// A stage that traces rays.
@@ -103,6 +103,10 @@ pub struct Renderer {
     iterations: u32,
     emitted: u64,
     counters: Counters,
+    /// Photons that a lane needs room for at the most, and a batch.
+    photon_need: [u32; 2],
+    /// Whether the photons' buffers fit what photons need.
+    fitted: bool,
 }
 
 /// How often an iteration is done at the most: every other time halves what its loops have to do.
@@ -161,6 +165,8 @@ impl Renderer {
             iterations: 0,
             emitted: 0,
             counters: Counters::default(),
+            photon_need: [0, 0],
+            fitted: false,
         };
         renderer.upload_settings()?;
         // Before any work: memory that lacks is told now and not after an hour.
@@ -189,6 +195,7 @@ impl Renderer {
             all.wall += run.wall;
             let status = self.status()?;
             if status.again == 0 {
+                self.photon_need = self.photon_need.max([status.lane_need, status.batch_need]);
                 return Ok((all, status));
             }
             self.counters.repeated_iterations += 1;
@@ -206,8 +213,7 @@ impl Renderer {
         if status.again & LANES_TOO_LONG != 0 {
             self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
         } else if status.again & PHOTONS_DID_NOT_FIT != 0 {
-            let need = status.lane_need.saturating_add(status.lane_need / 4 + 1);
-            self.sizes.lane_capacity = self.sizes.lane_capacity.max(need);
+            self.sizes.grow(status.lane_need, status.batch_need);
         }
         if status.again & (LANES_TOO_LONG | PHOTONS_DID_NOT_FIT) != 0 {
             self.sizes.shrink_batch(&self.limits);
@@ -219,6 +225,17 @@ impl Renderer {
         let mut recording = Recording::new();
         recording.fill(BufferId::GatheredOf, 0);
         self.run(&recording).map(|_| ())
+    }
+
+    /// Once photons have been traced, makes their buffers as large as those need. Their content is lost.
+    fn fit_photon_buffers(&mut self) -> Result<()> {
+        let [lane_need, batch_need] = self.photon_need;
+        if self.fitted || batch_need == 0 {
+            return Ok(());
+        }
+        self.fitted = true;
+        self.sizes.fit(lane_need, batch_need);
+        self.upload_settings()
     }
 
     /// What the last recording that began with [`reporting`] reported.
@@ -236,6 +253,7 @@ impl Renderer {
     /// # Errors
     /// As [`Backend::iterate`].
     pub fn trace(&mut self) -> Result<Run> {
+        self.fit_photon_buffers()?;
         let (run, _) = self.run_until_it_fits(|stages| {
             let mut recording = reporting();
             stages.camera(0, &mut recording);
@@ -243,6 +261,20 @@ impl Renderer {
             recording
         })?;
         Ok(run)
+    }
+
+    /// Makes the picture so far; returns what that took as well.
+    ///
+    /// # Errors
+    /// As [`Backend::resolve`].
+    pub fn picture(&mut self) -> Result<(Run, Image)> {
+        let recording = self.stages().picture(self.iterations.max(1), self.emitted.max(1));
+        let run = self.run(&recording)?;
+        self.counters.non_finite += u64::from(self.status()?.non_finite);
+        let [width, height] = self.config.resolution.map(|side| side as usize);
+        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
+        let pixels = film.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+        Ok((run, Image::new(width, height, pixels)))
     }
 
     /// Gathers the photons at hand with any method of a device; what was gathered before is forgotten. Returns what it
@@ -278,7 +310,7 @@ impl Renderer {
         let sizes = &self.sizes;
         self.settings.photon_lanes = sizes.photon_lanes;
         self.settings.lane_capacity = sizes.lane_capacity;
-        self.settings.photon_capacity = sizes.photon_capacity();
+        self.settings.photon_capacity = sizes.photon_capacity;
         self.settings.cell_bits = sizes.cell_bits;
         self.settings.slots_per_pixel = sizes.slots_per_pixel;
         self.device.upload(BufferId::Settings, &[self.settings])
@@ -353,6 +385,7 @@ impl Renderer {
 
 impl Backend for Renderer {
     fn iterate(&mut self) -> Result<Run> {
+        self.fit_photon_buffers()?;
         let iteration = self.iterations;
         let (run, status) = self.run_until_it_fits(|stages| stages.iteration(iteration))?;
         let counters = &mut self.counters;
@@ -368,16 +401,7 @@ impl Backend for Renderer {
     }
 
     fn resolve(&mut self) -> Result<Image> {
-        let recording = self.stages().picture(self.iterations.max(1), self.emitted.max(1));
-        self.run(&recording)?;
-        self.counters.non_finite += u64::from(self.status()?.non_finite);
-        let [width, height] = self.config.resolution.map(|side| side as usize);
-        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
-        Ok(Image::new(
-            width,
-            height,
-            film.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
-        ))
+        self.picture().map(|(_, image)| image)
     }
 
     fn iterations(&self) -> u32 {

@@ -78,6 +78,10 @@ pub enum BufferId {
     ClusterSizes,
     /// First place of each cluster in [`BufferId::PointOrder`], u32.
     ClusterStarts,
+    /// What a kernel copies to find out how fast the memory is.
+    ProbeFrom,
+    /// Where it copies it to.
+    ProbeTo,
     /// Photons tested for each slot, u32, where they are counted.
     TestsOf,
     /// Sort keys, u32.

@@ -104,7 +104,8 @@ fn imports_go_downward() {
                 "crate::record",
             ],
         ),
-        ("pipeline.rs", &["crate::cli", "crate::cpu"]),
+        ("pipeline.rs", &["crate::cli", "crate::cpu", "crate::bench"]),
+        ("bench", &["crate::cli"]),
     ];
     for (file, text) in code() {
         for (layer, words) in forbidden {

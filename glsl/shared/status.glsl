@@ -1,6 +1,7 @@
 // What the stages report to the host. Counters add up until the host clears them.
 struct StatusCounters {
     uint lane_need;           // most photons that one invocation had to store
+    uint batch_need;          // most photons of a batch
     uint truncated_paths;     // ended by max_depth
     uint cut_paths;           // ended by the driver's loop limit
     uint non_finite;          // values that were NaN or infinite and were left out

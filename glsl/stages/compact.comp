@@ -20,17 +20,22 @@ layout(std430) writeonly buffer Photons { Photon photons[]; };
 void main() {
     uint i = invocation_index();
     if (i == 0u) {
-        photon_count = scan_total; // within the capacity, since no lane keeps more than its share
+        photon_count = min(scan_total, settings.photon_capacity);
+        atomicMax(status.batch_need, scan_total);
+        if (scan_total > settings.photon_capacity) {
+            atomicOr(status.again, PHOTONS_DID_NOT_FIT);
+        }
         uint before = status.photons_stored_low;
         status.photons_stored_low = before + scan_total;
         status.photons_stored_high += before + scan_total < before ? 1u : 0u;
     }
-    if (i >= settings.photon_capacity) {
+    if (i >= settings.photon_lanes * settings.lane_capacity) {
         return;
     }
     uint lane = i % settings.photon_lanes;
     uint number = i / settings.photon_lanes;
-    if (number < lane_counts[lane]) {
-        photons[lane_offsets[lane] + number] = PHOTON(LanePhotons, i);
+    uint place = lane_offsets[lane] + number;
+    if (number < lane_counts[lane] && place < settings.photon_capacity) {
+        photons[place] = PHOTON(LanePhotons, i);
     }
 }

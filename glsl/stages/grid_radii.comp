@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Sums up the radii of the visible points, a share of them in each workgroup: the grid's cell size follows from them.
+// Sums up the radii of a sample of the visible points: the grid's cell size follows from them.
 
 layout(local_size_x = 64) in;
 
@@ -13,6 +13,7 @@ layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push {
     uint groups;
+    uint step; // every how many slots
 } push;
 
 uniform usamplerBuffer VisiblePoints;
@@ -21,7 +22,8 @@ layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
 void main() {
     RadiusSum term = RadiusSum(0.0, 0.0, 0.0, 0u);
-    for (uint slot = invocation_index(); slot < slots(); slot += push.groups * gl_WorkGroupSize.x) {
+    uint step = push.groups * gl_WorkGroupSize.x * push.step;
+    for (uint slot = invocation_index() * push.step; slot < slots(); slot += step) {
         if (floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w) != NO_OBJECT) {
             float radius2 = TEXEL(StatisticsOf, 3u * slot).x;
             term = together(term, RadiusSum(radius2, 1.0 / radius2, radius2, 1u));

@@ -20,6 +20,13 @@ shared uint counts[DIGITS];
 
 void main() {
     uint me = gl_LocalInvocationID.x;
+    // Room for more keys than there are costs little.
+    if (workgroup_index() * TILE_KEYS >= sort_count) {
+        if (me < DIGITS && workgroup_index() < push.tiles) {
+            histograms[me * push.tiles + workgroup_index()] = 0u;
+        }
+        return;
+    }
     if (me < DIGITS) {
         counts[me] = 0u;
     }

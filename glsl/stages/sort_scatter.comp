@@ -24,6 +24,10 @@ shared uint places[DIGITS * gl_WorkGroupSize.x];
 
 void main() {
     uint me = gl_LocalInvocationID.x;
+    // Room for more keys than there are costs nothing.
+    if (workgroup_index() * TILE_KEYS >= sort_count) {
+        return;
+    }
     for (uint digit = 0u; digit < DIGITS; digit++) {
         places[digit * gl_WorkGroupSize.x + me] = 0u;
     }

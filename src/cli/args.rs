@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::bench::BenchGather;
 use crate::config::{Accel, Direct, Estimator};
 use crate::gather;
 
@@ -34,6 +35,9 @@ pub enum Command {
     },
     /// List the gather methods.
     Gathers,
+    /// Measure.
+    #[command(subcommand)]
+    Bench(Bench),
     /// Say what a scene holds.
     Inspect {
         /// glTF file (.gltf or .glb).
@@ -42,6 +46,13 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+}
+
+/// The benches.
+#[derive(Debug, Subcommand)]
+pub enum Bench {
+    /// The gather methods on one device: the paper's tables with its figures beside, then all methods.
+    Gather(Box<BenchGather>),
 }
 
 /// What computes.
@@ -131,7 +142,7 @@ pub struct RenderArguments {
     pub quiet: bool,
 }
 
-fn resolution(text: &str) -> Result<[u32; 2], String> {
+pub fn resolution(text: &str) -> Result<[u32; 2], String> {
     let parsed = text
         .split_once(['x', 'X'])
         .and_then(|(width, height)| Some([width.parse::<u32>().ok()?, height.parse::<u32>().ok()?]));
@@ -155,7 +166,7 @@ fn alpha(text: &str) -> Result<f32, String> {
     }
 }
 
-fn radius(text: &str) -> Result<f64, String> {
+pub fn radius(text: &str) -> Result<f64, String> {
     let radius = number(text)?;
     if radius > 0.0 && radius.is_finite() {
         Ok(radius)
@@ -181,7 +192,7 @@ fn exposure(text: &str) -> Result<f32, String> {
     }
 }
 
-fn gather_method(name: &str) -> Result<usize, String> {
+pub fn gather_method(name: &str) -> Result<usize, String> {
     gather::method(name).ok_or_else(|| {
         let names: Vec<_> = gather::METHODS.iter().map(|method| method.name).collect();
         format!("no such method; there are {}", names.join(", "))

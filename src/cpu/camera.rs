@@ -34,7 +34,7 @@ pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Vec<Visib
         .par_chunks_mut(slots_per_pixel)
         .enumerate()
         .for_each(|(pixel_slot, slots)| {
-            if let Some(pixel) = pixel_of(inputs.settings, pixel_slot as u32) {
+            if let Some(pixel) = pixel_of(inputs.settings.resolution, pixel_slot as u32) {
                 follow(inputs, pixel, iteration, slots, counts);
             }
         });

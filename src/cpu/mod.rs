@@ -37,6 +37,7 @@ pub use random::{PathKind, Random, pcg4d};
 pub use renderer::Renderer;
 pub use resolve::resolve;
 pub use sampling::{decode_direction, encode_direction};
+pub use tiles::pixel_of;
 pub use update::{fit_radius, radius_sums, reset, update};
 
 use crate::config::RenderConfig;

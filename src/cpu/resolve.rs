@@ -21,7 +21,7 @@ pub fn resolve(
     let slots_per_pixel = settings.slots_per_pixel as usize;
     let mut film = vec![[0.0; 4]; width * height];
     for pixel_slot in 0..pixel_slots(settings) {
-        let Some([x, y]) = pixel_of(settings, pixel_slot as u32) else {
+        let Some([x, y]) = pixel_of(settings.resolution, pixel_slot as u32) else {
             continue;
         };
         let mut radiance = DVec3::ZERO;

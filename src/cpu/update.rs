@@ -66,16 +66,15 @@ pub fn update(
         });
 }
 
-/// Sums over the visible points' radii in `groups` shares, from which the device chooses the next grid: points are dealt
-/// to shares in turn, `size` at a time.
+/// Sums over the radii of every `step`-th visible point in `groups` shares, from which the device chooses the next grid:
+/// points are dealt to shares in turn, `size` at a time.
 pub fn radius_sums(
     visible_points: &[VisiblePoint],
     statistics: &[Statistics],
-    groups: usize,
-    size: usize,
+    [groups, size, step]: [usize; 3],
 ) -> Vec<RadiusSum> {
     let mut sums = vec![(0.0f64, 0.0f64, 0.0f32, 0u32); groups];
-    for (slot, (point, statistics)) in visible_points.iter().zip(statistics).enumerate() {
+    for (slot, (point, statistics)) in visible_points.iter().zip(statistics).step_by(step).enumerate() {
         if word(point.position_object) != NO_OBJECT {
             let (radius2, inverse2, largest2, count) = &mut sums[slot / size % groups];
             *radius2 += f64::from(statistics.radius2_high);

@@ -6,7 +6,7 @@ mod primitives;
 
 pub use primitives::{PHOTON_PAIRS, POINT_PAIRS, Pairs, scan, sort};
 
-use crate::config::Sizes;
+use crate::config::{CLUSTERED_RUN, GROUP, Sizes};
 use crate::record::Recording;
 
 /// Records stages for buffers of these sizes.
@@ -35,6 +35,8 @@ pub enum Runs {
         gather: Record,
         /// How many photons a visible point tests.
         tests: Tests,
+        /// Visible points that a photon is loaded for at once.
+        sharing: u32,
     },
     /// A kd-tree on the CPU.
     CpuKdTree,
@@ -61,19 +63,12 @@ impl GatherMethod {
     }
 }
 
-const fn exhaustive(order: Record, gather: Record) -> Runs {
+const fn device(order: Record, gather: Record, tests: Tests, sharing: u32) -> Runs {
     Runs::Device {
         order,
         gather,
-        tests: Tests::All,
-    }
-}
-
-const fn near(order: Record, gather: Record) -> Runs {
-    Runs::Device {
-        order,
-        gather,
-        tests: Tests::Near,
+        tests,
+        sharing,
     }
 }
 
@@ -83,61 +78,61 @@ pub const METHODS: &[GatherMethod] = &[
         name: "naive",
         summary: "every visible point tests every photon",
         paper: "tables 1 to 3, «Naive solution»",
-        runs: exhaustive(points::by_slot, photons::naive),
+        runs: device(points::by_slot, photons::naive, Tests::All, 1),
     },
     GatherMethod {
         name: "naive-distance",
         summary: "the same by the built-in distance() instead of a squared distance",
         paper: "section 8, distance() against manual calculation",
-        runs: exhaustive(points::by_slot, photons::naive_distance),
+        runs: device(points::by_slot, photons::naive_distance, Tests::All, 1),
     },
     GatherMethod {
         name: "local",
         summary: "blocks of photons staged through shared memory",
         paper: "table 3, «Local memory»",
-        runs: exhaustive(points::by_slot, photons::local),
+        runs: device(points::by_slot, photons::local, Tests::All, GROUP),
     },
     GatherMethod {
         name: "photon-sort",
         summary: "photons sorted by mesh with atomic counters; a visible point tests its mesh's",
         paper: "table 3, «Photon sorting»",
-        runs: exhaustive(points::by_slot, photons::mesh),
+        runs: device(points::by_slot, photons::mesh, Tests::All, 1),
     },
     GatherMethod {
         name: "hitpoint-sort",
         summary: "visible points sorted by mesh too, with fillers so that no workgroup spans two",
         paper: "table 3, «Hitpoint sorting»",
-        runs: exhaustive(points::by_mesh, photons::ordered_mesh),
+        runs: device(points::by_mesh, photons::ordered_mesh, Tests::All, 1),
     },
     GatherMethod {
         name: "hitpoint-sort-local-distance",
         summary: "the same through shared memory, by the built-in distance()",
         paper: "table 3, «Hitpoint sorting, local memory»",
-        runs: exhaustive(points::by_mesh, photons::ordered_mesh_local_distance),
+        runs: device(points::by_mesh, photons::ordered_mesh_local_distance, Tests::All, GROUP),
     },
     GatherMethod {
         name: "hitpoint-sort-local",
         summary: "the same through shared memory, by a squared distance",
         paper: "section 8, 125 ms and 1 941 ms; table 4, «Hitpoint sorting, local memory»",
-        runs: exhaustive(points::by_mesh, photons::ordered_mesh_local),
+        runs: device(points::by_mesh, photons::ordered_mesh_local, Tests::All, GROUP),
     },
     GatherMethod {
         name: "cluster",
         summary: "visible points in k-means clusters within their mesh, with fillers; shared memory",
         paper: "section 8, clusters without a grid (33 % fillers)",
-        runs: exhaustive(points::by_cluster, photons::ordered_mesh_local),
+        runs: device(points::by_cluster, photons::ordered_mesh_local, Tests::All, GROUP),
     },
     GatherMethod {
         name: "cluster-grid",
         summary: "the clusters, and a grid for each object whose cells are sorted with atomic counters",
         paper: "table 4, «Grid structure»",
-        runs: near(points::by_cluster, photons::object_grids),
+        runs: device(points::by_cluster, photons::object_grids, Tests::Near, 1),
     },
     GatherMethod {
         name: "clustered",
         summary: "runs of neighbouring visible points share what they load from rows of a hashed grid",
         paper: "beyond the paper",
-        runs: near(points::by_slot, photons::hashed_grid),
+        runs: device(points::by_slot, photons::hashed_grid, Tests::Near, CLUSTERED_RUN),
     },
     GatherMethod {
         name: "cpu-kdtree",

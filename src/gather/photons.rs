@@ -104,7 +104,7 @@ impl Exhaustive {
             sizes.slots().div_ceil(GROUP)
         };
         let stride = sizes.probe.stride;
-        let photons = sizes.photon_capacity();
+        let photons = sizes.photon_capacity;
         for first in (0..photons).step_by(EXHAUSTIVE_RANGE as usize) {
             let push = [first, first.saturating_add(EXHAUSTIVE_RANGE), stride];
             let stage = gather_stage(shader, groups.div_ceil(stride) * GROUP, sizes).push(push);
@@ -125,7 +125,7 @@ fn gather_stage(shader: &'static Shader, threads: u32, sizes: &Sizes) -> StageDe
 
 /// The paper's photon sorting: one map a mesh, filled by an atomic counter a mesh.
 fn sort_by_mesh(sizes: &Sizes, recording: &mut Recording) {
-    let photons = sizes.photon_capacity();
+    let photons = sizes.photon_capacity;
     recording.fill(BufferId::MeshEnds, 0);
     recording.dispatch(StageDesc::new(&shaders::MESH_COUNT, photons));
     scan(BufferId::MeshEnds, sizes.meshes, recording);
@@ -134,7 +134,7 @@ fn sort_by_mesh(sizes: &Sizes, recording: &mut Recording) {
 
 /// The cells of the objects' grids that a cluster reaches.
 pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
-    let (photons, cells) = (sizes.photon_capacity(), sizes.object_cells);
+    let (photons, cells) = (sizes.photon_capacity, sizes.object_cells);
     recording.fill(BufferId::ObjectCells, 0);
     recording.dispatch(StageDesc::new(&shaders::OBJECT_CELL_COUNT, photons));
     if let Some(maximum) = sizes.cell_photons {
@@ -153,9 +153,9 @@ pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
 
 /// The cells of a hashed grid that a few neighbouring visible points reach.
 pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
-    let photons = sizes.photon_capacity();
+    let photons = sizes.photon_capacity;
     let radius_threads = RADIUS_GROUPS * shaders::GRID_RADII.workgroup;
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, radius_threads).push(RADIUS_GROUPS));
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, radius_threads).push([RADIUS_GROUPS, CLUSTERED_RUN]));
     recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup).push(RADIUS_GROUPS));
     recording.fill(BufferId::CellStarts, 0);
     recording.dispatch(StageDesc::new(&shaders::GRID_KEYS, photons));
@@ -169,7 +169,7 @@ pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
 
 /// A gather that looks at the sorted photons part by part: all at once unless the driver cuts its loops.
 fn in_parts(shader: &'static Shader, threads: u32, sizes: &Sizes, recording: &mut Recording) {
-    let photons = sizes.photon_capacity();
+    let photons = sizes.photon_capacity;
     let part = photons.div_ceil(sizes.gather_parts);
     for first in (0..photons).step_by(part as usize) {
         recording.dispatch(gather_stage(shader, threads, sizes).push([first, first.saturating_add(part)]));

@@ -117,12 +117,17 @@ impl Device {
                 self.summary.max_storage_buffer_bytes >> 20
             )));
         }
-        if let Some(old) = self.buffers.remove(&id) {
-            old.free(&self.context);
-        }
+        self.remove(id);
         let buffer = Buffer::new(&self.context, &format!("{id:?}"), bytes, MemoryLocation::GpuOnly)?;
         self.buffers.insert(id, buffer);
         Ok(())
+    }
+
+    /// Gives back the memory of the buffer `id`.
+    pub(super) fn remove(&mut self, id: BufferId) {
+        if let Some(buffer) = self.buffers.remove(&id) {
+            buffer.free(&self.context);
+        }
     }
 
     /// Makes the buffer `id` with this content.

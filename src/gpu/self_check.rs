@@ -1,4 +1,4 @@
-//! What the driver does that no limit of Vulkan's says.
+//! What the device does that no limit of Vulkan's says.
 
 use super::device::Device;
 use crate::error::Result;
@@ -20,4 +20,33 @@ pub(super) fn loop_limit(device: &mut Device) -> Result<u32> {
         Some(&done) if done < ASKED => done,
         _ => u32::MAX,
     })
+}
+
+/// Bytes that the copy moves in each direction, where the device binds as many.
+const COPIED: u64 = 64 << 20;
+/// Copies, of which the median counts.
+const COPIES: usize = 9;
+
+impl Device {
+    /// Bytes a second that a kernel reads and writes when it copies, both counted.
+    ///
+    /// # Errors
+    /// No memory, or a failed Vulkan call.
+    pub fn copy_bandwidth(&mut self) -> Result<f64> {
+        let texels = u64::from(self.summary().max_texels);
+        let bytes = COPIED.min(self.summary().max_storage_buffer_bytes).min(texels * 16);
+        self.create(BufferId::ProbeFrom, bytes)?;
+        self.create(BufferId::ProbeTo, bytes)?;
+        let mut recording = Recording::new();
+        recording.fill(BufferId::ProbeFrom, 1);
+        for _ in 0..COPIES {
+            recording.dispatch(StageDesc::new(&shaders::COPY_PROBE, (bytes / 16) as u32));
+        }
+        let run = self.run(&recording)?;
+        self.remove(BufferId::ProbeFrom);
+        self.remove(BufferId::ProbeTo);
+        let mut times: Vec<f64> = run.launches.iter().map(|launch| launch.duration_ns).collect();
+        times.sort_by(f64::total_cmp);
+        Ok(2.0 * bytes as f64 / (times[times.len() / 2] * 1e-9))
+    }
 }

@@ -40,7 +40,7 @@ fn assert_methods_agree(
         "one visible point a slot"
     );
     assert!(
-        photons.len() <= bench.renderer.sizes().photon_capacity() as usize,
+        photons.len() <= bench.renderer.sizes().photon_capacity as usize,
         "more photons than the buffers hold"
     );
     let mut expected = vec![Gathered { flux_count: [0.0; 4] }; points.len()];

@@ -171,11 +171,11 @@ fn radii_are_summed_up_and_updates_clear_what_was_gathered() {
     let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
     let mut recording = Recording::new();
     let threads = RADIUS_GROUPS * shaders::GRID_RADII.workgroup;
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, threads).push(RADIUS_GROUPS));
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, threads).push([RADIUS_GROUPS, 3]));
     bench.renderer.run(&recording).expect("radii");
     let found: Vec<RadiusSum> = bench.download(BufferId::RadiusSums);
     let size = shaders::GRID_RADII.workgroup as usize;
-    let expected = cpu::radius_sums(&points, &statistics, RADIUS_GROUPS as usize, size);
+    let expected = cpu::radius_sums(&points, &statistics, [RADIUS_GROUPS as usize, size, 3]);
     assert_eq!(found.len(), expected.len());
     for (group, (found, expected)) in found.iter().zip(&expected).enumerate() {
         assert_eq!(

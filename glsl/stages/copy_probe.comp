@@ -1,0 +1,18 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Copies 16 bytes an invocation: what the device's memory moves for a kernel.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "texel.glsl"
+
+uniform usamplerBuffer ProbeFrom;
+layout(std430) writeonly buffer ProbeTo { uvec4 probe_to[]; };
+
+void main() {
+    uint i = invocation_index();
+    if (i < probe_to.length()) {
+        probe_to[i] = TEXEL_BITS(ProbeFrom, i);
+    }
+}

@@ -1,0 +1,438 @@
+//! Every gather method on the same visible points and photons.
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::median;
+use super::structure::{Structure, structure};
+use crate::backend::{Backend, DeviceDescription};
+use crate::config::{GROUP, Probe, RenderConfig};
+use crate::cpu::{self, Counts, Inputs};
+use crate::error::{Error, Result};
+use crate::gather::{METHODS, Runs, Tests, is_gather_stage};
+use crate::gpu::Device;
+use crate::layout::{Gathered, NO_OBJECT, Photon, Settings, Statistics, VisiblePoint};
+use crate::pipeline::Renderer;
+use crate::record::Run;
+use crate::scene::{Camera, PackedScene};
+use crate::stage::BufferId;
+
+/// Microseconds that one gather may take; a slower method is measured on a share of the visible points.
+const BUDGET_US: f64 = 1e6;
+
+/// What is measured.
+pub struct GatherBench<'a> {
+    /// The scene.
+    pub scene: &'a PackedScene,
+    /// Its camera.
+    pub camera: &'a Camera,
+    /// Device, by index or a part of its name.
+    pub device: Option<&'a str>,
+    /// Everything but the resolution.
+    pub config: RenderConfig,
+    /// Pixels, width and height.
+    pub resolutions: Vec<[u32; 2]>,
+    /// Indices into [`METHODS`].
+    pub methods: Vec<usize>,
+    /// How often each method runs.
+    pub repeats: usize,
+}
+
+/// What a bench found out.
+#[derive(Debug, Clone, Serialize)]
+pub struct Results {
+    /// Where.
+    pub device: DeviceDescription,
+    /// Bytes a second that a copying kernel reads and writes, both counted.
+    pub copy_bytes_per_s: f64,
+    /// Photon paths.
+    pub photon_paths: u32,
+    /// How often each method ran.
+    pub repeats: usize,
+    /// One for each resolution.
+    pub resolutions: Vec<ResolutionResult>,
+}
+
+/// A resolution's figures.
+#[derive(Debug, Clone, Serialize)]
+pub struct ResolutionResult {
+    /// Pixels, width and height.
+    pub resolution: [u32; 2],
+    /// Visible points.
+    pub visible_points: usize,
+    /// Photons stored.
+    pub photons: usize,
+    /// The paper's other steps.
+    pub steps: StepTimes,
+    /// One for each method.
+    pub methods: Vec<MethodResult>,
+}
+
+/// What the steps besides the gather take, in microseconds: device, CPU.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct StepTimes {
+    /// Finding the visible points.
+    pub raytracing_us: [f64; 2],
+    /// Tracing photons, and moving them together.
+    pub photon_tracing_us: [f64; 2],
+    /// Making the picture.
+    pub synthesize_us: [f64; 2],
+}
+
+/// A method's figures, of all visible points.
+#[derive(Debug, Clone, Serialize)]
+pub struct MethodResult {
+    /// Its name.
+    pub method: &'static str,
+    /// Ordering the visible points.
+    pub order_us: f64,
+    /// Ordering the photons.
+    pub build_us: f64,
+    /// Gathering.
+    pub gather_us: f64,
+    /// Part of the visible points that were gathered for; the gather's time is scaled up from it.
+    pub share: f64,
+    /// Photons tested for a visible point, on average.
+    pub tested: f64,
+    /// Photons accepted by a visible point, on average.
+    pub accepted: f64,
+    /// Photons tested in a second of gathering.
+    pub tests_per_s: f64,
+    /// Bytes of photons, visible points and sums that invocations load and store in a second of gathering.
+    pub bytes_per_s: f64,
+    /// What the method built.
+    pub structure: Structure,
+}
+
+impl MethodResult {
+    /// Ordering photons and gathering them: what each iteration of the paper's estimator costs.
+    pub fn build_and_gather_us(&self) -> f64 {
+        self.build_us + self.gather_us
+    }
+
+    /// With ordering new visible points: what each iteration of the stochastic estimator costs.
+    pub fn total_us(&self) -> f64 {
+        self.order_us + self.build_and_gather_us()
+    }
+}
+
+/// Visible points, photons and what each point accepts of them.
+struct Input {
+    points: Vec<VisiblePoint>,
+    statistics: Vec<Statistics>,
+    photons: Vec<Photon>,
+    /// M of each slot, by a kd-tree on the CPU.
+    expected: Vec<u32>,
+}
+
+impl GatherBench<'_> {
+    /// Runs the bench; `note` hears what it is doing.
+    ///
+    /// # Errors
+    /// Whatever a render can meet, and a method that finds other photons than a kd-tree on the CPU does.
+    pub fn run(&self, note: &dyn Fn(&str)) -> Result<Results> {
+        let mut resolutions = Vec::new();
+        let mut copy_bytes_per_s = f64::NAN;
+        let mut device = None;
+        for &resolution in &self.resolutions {
+            let mut renderer = self.renderer(resolution)?;
+            if device.is_none() {
+                note("copy bandwidth");
+                copy_bytes_per_s = renderer.gpu().copy_bandwidth()?;
+                device = Some(renderer.device());
+            }
+            resolutions.push(self.resolution(&mut renderer, resolution, note)?);
+        }
+        Ok(Results {
+            device: device.ok_or_else(|| Error::Config("no resolution to measure".to_owned()))?,
+            copy_bytes_per_s,
+            photon_paths: self.config.photons,
+            repeats: self.repeats,
+            resolutions,
+        })
+    }
+
+    /// A renderer at this resolution, before its first iteration.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn renderer(&self, resolution: [u32; 2]) -> Result<Renderer> {
+        let config = RenderConfig {
+            resolution,
+            ..self.config.clone()
+        };
+        Renderer::new(Device::open(self.device)?, self.scene, self.camera, config)
+    }
+
+    fn resolution(
+        &self,
+        renderer: &mut Renderer,
+        resolution: [u32; 2],
+        note: &dyn Fn(&str),
+    ) -> Result<ResolutionResult> {
+        let [width, height] = resolution;
+        note(&format!("{width}x{height}: rays, photons, kd-tree"));
+        if renderer.sizes().batches(self.config.photons) > 1 {
+            return Err(Error::Config(format!(
+                "--photons {}: more than the device holds at once ({}); try fewer, or --scaling",
+                self.config.photons,
+                renderer.sizes().batch_paths
+            )));
+        }
+        let mut steps = self.device_steps(renderer)?;
+        let input = input(renderer)?;
+        self.cpu_steps(renderer, resolution, &mut steps)?;
+        let visible_points = input.points.iter().filter(|point| object(point) != NO_OBJECT).count();
+
+        let mut methods = Vec::new();
+        for &method in &self.methods {
+            note(&format!(
+                "{width}x{height}: {} against the kd-tree",
+                METHODS[method].name
+            ));
+            methods.push(Measured::new(renderer, method, &input, visible_points)?);
+        }
+        for repeat in 1..=self.repeats {
+            note(&format!("{width}x{height}: run {repeat} of {}", self.repeats));
+            for measured in &mut methods {
+                measured.repeat(renderer, &input)?;
+            }
+        }
+        Ok(ResolutionResult {
+            resolution,
+            visible_points,
+            photons: input.photons.len(),
+            steps,
+            methods: methods
+                .into_iter()
+                .map(|method| method.result(visible_points))
+                .collect(),
+        })
+    }
+
+    fn device_steps(&self, renderer: &mut Renderer) -> Result<StepTimes> {
+        let (mut rays, mut photons, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
+        // One more, to warm up.
+        for _ in 0..=self.repeats {
+            let run = renderer.trace()?;
+            let camera = time_of(&run, |stage| stage == "camera");
+            rays.push(camera);
+            photons.push(time_of(&run, |_| true) - camera);
+            pictures.push(time_of(&renderer.picture()?.0, |_| true));
+        }
+        let warm = |times: Vec<f64>| median(times.into_iter().skip(1).collect());
+        Ok(StepTimes {
+            raytracing_us: [warm(rays), f64::NAN],
+            photon_tracing_us: [warm(photons), f64::NAN],
+            synthesize_us: [warm(pictures), f64::NAN],
+        })
+    }
+
+    fn cpu_steps(&self, renderer: &mut Renderer, resolution: [u32; 2], steps: &mut StepTimes) -> Result<()> {
+        let settings: Vec<Settings> = renderer.gpu().download(BufferId::Settings, Some(1))?;
+        let statistics: Vec<Statistics> = renderer.gpu().download(BufferId::StatisticsOf, None)?;
+        let direct = renderer.gpu().download(BufferId::DirectSums, None)?;
+        let config = RenderConfig {
+            resolution,
+            ..self.config.clone()
+        };
+        let inputs = Inputs {
+            scene: self.scene,
+            settings: &settings[0],
+            config: &config,
+        };
+        let counts = Counts::default();
+        let batch = cpu::Batch {
+            iteration: 0,
+            first_path: 0,
+            paths: config.photons,
+        };
+        steps.raytracing_us[1] = timed_us(|| cpu::camera(&inputs, 0, &counts)).1;
+        steps.photon_tracing_us[1] = timed_us(|| cpu::compact(&cpu::photons(&inputs, batch, &counts))).1;
+        steps.synthesize_us[1] = timed_us(|| cpu::resolve(&settings[0], &statistics, &direct, 1, 1)).1;
+        Ok(())
+    }
+}
+
+fn input(renderer: &mut Renderer) -> Result<Input> {
+    let count: Vec<u32> = renderer.gpu().download(BufferId::PhotonCount, Some(1))?;
+    let mut input = Input {
+        points: renderer.gpu().download(BufferId::VisiblePoints, None)?,
+        statistics: renderer.gpu().download(BufferId::StatisticsOf, None)?,
+        photons: renderer.gpu().download(BufferId::Photons, Some(count[0] as usize))?,
+        expected: Vec::new(),
+    };
+    let mut gathered = vec![Gathered { flux_count: [0.0; 4] }; input.points.len()];
+    cpu::gather_kd_tree(&input.points, &input.statistics, &input.photons, &mut gathered)?;
+    input.expected = gathered.iter().map(count_of).collect();
+    Ok(input)
+}
+
+fn object(point: &VisiblePoint) -> u32 {
+    point.position_object[3].to_bits()
+}
+
+fn count_of(gathered: &Gathered) -> u32 {
+    gathered.flux_count[3].to_bits()
+}
+
+/// Result of some work, and the microseconds that it took.
+fn timed_us<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let begin = Instant::now();
+    let result = work();
+    (result, begin.elapsed().as_secs_f64() * 1e6)
+}
+
+/// Microseconds of the launches of some stages.
+fn time_of(run: &Run, which: impl Fn(&str) -> bool) -> f64 {
+    let launches = run.launches.iter().filter(|launch| which(launch.stage));
+    launches.map(|launch| launch.duration_ns * 1e-3).sum()
+}
+
+/// Microseconds of ordering points, ordering photons, gathering.
+fn phases(run: &Run) -> [f64; 3] {
+    // Photons come after points; the first stage that reads photons begins the second phase.
+    let begins_build = |stage: &str| ["mesh_count", "object_cell_count", "grid_radii"].contains(&stage);
+    let mut phase = 0;
+    let mut times = [0.0; 3];
+    for launch in &run.launches {
+        if is_gather_stage(launch.stage) {
+            phase = 2;
+        } else if begins_build(launch.stage) {
+            phase = 1;
+        }
+        times[phase] += launch.duration_ns * 1e-3;
+    }
+    times
+}
+
+/// A method that is being measured.
+struct Measured {
+    method: usize,
+    probe: Probe,
+    share: f64,
+    tested: f64,
+    accepted: f64,
+    structure: Structure,
+    times: Vec<[f64; 3]>,
+}
+
+impl Measured {
+    /// Compares what the method finds with what is expected, and chooses the share to measure it on.
+    fn new(renderer: &mut Renderer, method: usize, input: &Input, visible_points: usize) -> Result<Self> {
+        let mut measured = Self {
+            method,
+            probe: Probe::default(),
+            share: 1.0,
+            tested: input.photons.len() as f64,
+            accepted: mean(input.expected.iter().copied(), visible_points),
+            structure: Structure::default(),
+            times: Vec::new(),
+        };
+        let Runs::Device { tests, .. } = METHODS[method].runs else {
+            if matches!(METHODS[method].runs, Runs::CpuNaive) {
+                measured.choose_stride(measured.cpu_naive(input, 256) * 256.0);
+            } else {
+                measured.tested = f64::NAN;
+            }
+            return Ok(measured);
+        };
+        if tests == Tests::All {
+            let stride = renderer.sizes().slots().div_ceil(GROUP).div_ceil(16);
+            measured.probe.stride = stride;
+            // Twice: the first run compiles.
+            renderer.gather(method, measured.probe)?;
+            let (run, _) = renderer.gather(method, measured.probe)?;
+            measured.choose_stride(phases(&run)[2] * f64::from(stride));
+        }
+        let counting = Probe {
+            count_tests: true,
+            ..measured.probe
+        };
+        renderer.gather(method, counting)?;
+        measured.structure = structure(renderer, METHODS[method].name)?;
+        let gathered: Vec<Gathered> = renderer.gpu().download(BufferId::GatheredOf, None)?;
+        let tests: Vec<u32> = renderer.gpu().download(BufferId::TestsOf, None)?;
+        let whole = measured.probe.stride == 1;
+        let mut seen = 0;
+        for (slot, point) in input.points.iter().enumerate() {
+            if object(point) == NO_OBJECT || !(whole || tests[slot] > 0) {
+                continue;
+            }
+            seen += 1;
+            let (found, expected) = (count_of(&gathered[slot]), input.expected[slot]);
+            if found != expected && renderer.sizes().cell_photons.is_none() {
+                return Err(Error::Device(format!(
+                    "method {}: finds {found} photons for visible point {slot}, a kd-tree {expected}; please report this \
+                     with the device and its driver",
+                    METHODS[method].name
+                )));
+            }
+        }
+        measured.share = seen as f64 / visible_points.max(1) as f64;
+        measured.tested = mean(tests.into_iter(), seen);
+        // And once as it will be timed.
+        renderer.gather(method, measured.probe)?;
+        Ok(measured)
+    }
+
+    /// Chooses a stride by what all visible points would take.
+    fn choose_stride(&mut self, whole_us: f64) {
+        self.probe.stride = (whole_us / BUDGET_US).ceil().max(1.0) as u32;
+        self.share = 1.0 / f64::from(self.probe.stride);
+    }
+
+    /// Microseconds of testing every photon on the CPU for one visible point in `stride`.
+    fn cpu_naive(&self, input: &Input, stride: usize) -> f64 {
+        let points: Vec<VisiblePoint> = input.points.iter().copied().step_by(stride).collect();
+        let statistics: Vec<Statistics> = input.statistics.iter().copied().step_by(stride).collect();
+        let mut gathered = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
+        timed_us(|| cpu::gather_naive(&points, &statistics, &input.photons, &mut gathered)).1
+    }
+
+    fn repeat(&mut self, renderer: &mut Renderer, input: &Input) -> Result<()> {
+        let times = match METHODS[self.method].runs {
+            Runs::Device { .. } => phases(&renderer.gather(self.method, self.probe)?.0),
+            Runs::CpuNaive => [0.0, 0.0, self.cpu_naive(input, self.probe.stride as usize)],
+            Runs::CpuKdTree => {
+                let mut gathered = vec![Gathered { flux_count: [0.0; 4] }; input.points.len()];
+                let (found, us) =
+                    timed_us(|| cpu::gather_kd_tree(&input.points, &input.statistics, &input.photons, &mut gathered));
+                found?;
+                [0.0, 0.0, us]
+            }
+        };
+        self.times.push(times);
+        Ok(())
+    }
+
+    fn result(self, visible_points: usize) -> MethodResult {
+        let phase = |index: usize| median(self.times.iter().map(|times| times[index]).collect());
+        let gather_us = phase(2) / self.share;
+        let sharing = match METHODS[self.method].runs {
+            Runs::Device { sharing, .. } => f64::from(sharing),
+            _ => 1.0,
+        };
+        let tests = self.tested * visible_points as f64;
+        // Position, normal and R² of a visible point, and its sum read and written.
+        let point_bytes = 3 * 16 + 2 * size_of::<Gathered>();
+        let bytes = tests / sharing * size_of::<Photon>() as f64 + (visible_points * point_bytes) as f64;
+        MethodResult {
+            method: METHODS[self.method].name,
+            order_us: phase(0),
+            build_us: phase(1),
+            gather_us,
+            share: self.share,
+            tested: self.tested,
+            accepted: self.accepted,
+            tests_per_s: tests / gather_us * 1e6,
+            bytes_per_s: bytes / gather_us * 1e6,
+            structure: self.structure,
+        }
+    }
+}
+
+fn mean(counts: impl Iterator<Item = u32>, number: usize) -> f64 {
+    counts.map(f64::from).sum::<f64>() / number.max(1) as f64
+}

@@ -1,0 +1,165 @@
+//! A bench's results as SVG.
+
+use plotters::prelude::*;
+
+use super::gather::Results;
+use super::scaling::Scaling;
+use crate::error::{Error, Result};
+
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+
+fn drawing<E: std::fmt::Display>(error: E) -> Error {
+    Error::Config(format!("the plot can't be drawn: {error}"))
+}
+
+/// Build and gather of each method, one bar a resolution, on a logarithmic scale.
+///
+/// # Errors
+/// A drawing that fails.
+pub fn plot_methods(results: &Results) -> Result<String> {
+    let names: Vec<&str> = results
+        .resolutions
+        .first()
+        .map(|result| result.methods.iter().map(|method| method.method).collect())
+        .unwrap_or_default();
+    let times: Vec<Vec<f64>> = results
+        .resolutions
+        .iter()
+        .map(|result| {
+            let methods = result.methods.iter();
+            methods.map(|method| method.build_and_gather_us() * 1e-3).collect()
+        })
+        .collect();
+    let largest = times.iter().flatten().copied().fold(1.0, f64::max) * 2.0;
+    let smallest = times.iter().flatten().copied().fold(largest, f64::min) / 2.0;
+    let mut svg = String::new();
+    {
+        let height = 90 + 44 * names.len() as u32;
+        let area = SVGBackend::with_string(&mut svg, (900, height)).into_drawing_area();
+        area.fill(&WHITE).map_err(drawing)?;
+        let caption = format!("build and gather, ms: {}", results.device.name);
+        let mut chart = ChartBuilder::on(&area)
+            .caption(caption, ("sans-serif", 18))
+            .margin(10)
+            .x_label_area_size(30)
+            .y_label_area_size(220)
+            .build_cartesian_2d((smallest..largest).log_scale(), 0.0..names.len() as f64)
+            .map_err(drawing)?;
+        chart
+            .configure_mesh()
+            .disable_y_mesh()
+            .y_labels(0)
+            .x_label_formatter(&|x| label(*x))
+            .draw()
+            .map_err(drawing)?;
+        let thickness = 0.8 / times.len().max(1) as f64;
+        for (index, (result, times)) in results.resolutions.iter().zip(&times).enumerate() {
+            let color = COLORS[index % COLORS.len()];
+            let [width, height] = result.resolution;
+            let bars = times.iter().enumerate().map(|(row, &time)| {
+                let top = (names.len() - row) as f64 - 0.1 - thickness * index as f64;
+                Rectangle::new([(smallest, top), (time, top - thickness)], color.filled())
+            });
+            chart
+                .draw_series(bars)
+                .map_err(drawing)?
+                .label(format!("{width}x{height}"))
+                .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], color.filled()));
+        }
+        for (row, name) in names.iter().enumerate() {
+            let middle = chart
+                .plotting_area()
+                .map_coordinate(&(smallest, (names.len() - row) as f64 - 0.5));
+            let style = ("sans-serif", 14).into_font().color(&BLACK);
+            area.draw(&Text::new(*name, (15, middle.1 - 7), style))
+                .map_err(drawing)?;
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::LowerRight)
+            .background_style(WHITE.mix(0.8))
+            .border_style(BLACK)
+            .draw()
+            .map_err(drawing)?;
+        area.present().map_err(drawing)?;
+    }
+    Ok(svg)
+}
+
+/// A tick of a logarithmic axis.
+fn label(value: f64) -> String {
+    if (0.001..100_000.0).contains(&value) {
+        format!("{value}")
+    } else {
+        format!("{value:.0e}")
+    }
+}
+
+/// Cost against each quantity, in a panel each, on logarithmic scales.
+///
+/// # Errors
+/// A drawing that fails.
+pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
+    let mut quantities: Vec<&str> = scaling.series.iter().map(|series| series.against).collect();
+    quantities.dedup();
+    quantities.truncate(3);
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, (1200, 420)).into_drawing_area();
+        area.fill(&WHITE).map_err(drawing)?;
+        for (panel, against) in area.split_evenly((1, quantities.len().max(1))).iter().zip(&quantities) {
+            let lines: Vec<_> = scaling
+                .series
+                .iter()
+                .filter(|series| series.against == *against)
+                .collect();
+            let points = || lines.iter().flat_map(|series| &series.points);
+            let range = |values: Vec<f64>| {
+                let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = values.iter().copied().fold(0.0, f64::max);
+                (low / 1.5..high * 1.5).log_scale()
+            };
+            let mut chart = ChartBuilder::on(panel)
+                .caption(format!("ms against {against}"), ("sans-serif", 15))
+                .margin(10)
+                .x_label_area_size(30)
+                .y_label_area_size(50)
+                .build_cartesian_2d(
+                    range(points().map(|point| point.x).collect()),
+                    range(points().map(|point| point.us * 1e-3).collect()),
+                )
+                .map_err(drawing)?;
+            chart
+                .configure_mesh()
+                .x_label_formatter(&|x| label(*x))
+                .y_label_formatter(&|y| label(*y))
+                .draw()
+                .map_err(drawing)?;
+            for (index, series) in lines.iter().enumerate() {
+                let color = COLORS[index % COLORS.len()];
+                let points: Vec<(f64, f64)> = series.points.iter().map(|point| (point.x, point.us * 1e-3)).collect();
+                chart
+                    .draw_series(LineSeries::new(points, color.stroke_width(2)).point_size(3))
+                    .map_err(drawing)?
+                    .label(format!("{}, slope {:.2}", series.method, series.slope()))
+                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+            }
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperLeft)
+                .background_style(WHITE.mix(0.8))
+                .border_style(BLACK)
+                .draw()
+                .map_err(drawing)?;
+        }
+        area.present().map_err(drawing)?;
+    }
+    Ok(svg)
+}

@@ -1,0 +1,209 @@
+//! How the cost of gathering grows with photons, visible points and radius.
+
+use serde::Serialize;
+
+use super::gather::GatherBench;
+use super::median;
+use crate::backend::{Backend, DeviceDescription};
+use crate::config::RenderConfig;
+use crate::error::{Error, Result};
+use crate::gather::{METHODS, Runs, Tests};
+use crate::gpu::Device;
+use crate::pipeline::Renderer;
+use crate::record::Run;
+
+/// Photon paths of an iteration.
+const PHOTONS: [u32; 7] = [10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000];
+/// Factors of the picture's sides.
+const SIDES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 6.0];
+/// Factors of the radius.
+const RADII: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
+/// Photon paths up to which more than one iteration is measured.
+const REPEATED: u32 = 400_000;
+
+/// Costs of some methods.
+#[derive(Debug, Clone, Serialize)]
+pub struct Scaling {
+    /// Where.
+    pub device: DeviceDescription,
+    /// One for each method and quantity.
+    pub series: Vec<Series>,
+}
+
+/// A method's cost against a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Series {
+    /// The method's name.
+    pub method: &'static str,
+    /// What is varied.
+    pub against: &'static str,
+    /// In growing order.
+    pub points: Vec<Point>,
+}
+
+/// A measured cost.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// The quantity.
+    pub x: f64,
+    /// Microseconds of building and gathering in an iteration.
+    pub us: f64,
+}
+
+impl Series {
+    /// Slope of the line through the points, in logarithms, by least squares.
+    pub fn slope(&self) -> f64 {
+        let logs: Vec<(f64, f64)> = self.points.iter().map(|point| (point.x.ln(), point.us.ln())).collect();
+        let count = logs.len() as f64;
+        let (mean_x, mean_y) = (
+            logs.iter().map(|log| log.0).sum::<f64>() / count,
+            logs.iter().map(|log| log.1).sum::<f64>() / count,
+        );
+        let covariance: f64 = logs.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
+        let variance: f64 = logs.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
+        covariance / variance
+    }
+}
+
+/// Measures the cost of those of the bench's methods that look at nearby photons alone, at its first resolution, with the
+/// radius fixed at what is automatic there. Photon paths go up to `most_photons`.
+///
+/// # Errors
+/// Whatever a render can meet.
+pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> Result<Scaling> {
+    let [width, height] = *bench
+        .resolutions
+        .first()
+        .ok_or_else(|| Error::Config("no resolution to measure".to_owned()))?;
+    let renderer = bench.renderer([width, height])?;
+    let device = renderer.device();
+    let radius = bench
+        .config
+        .radius
+        .unwrap_or(f64::from(renderer.radius()) / bench.scene.scale);
+    drop(renderer);
+    let near = |method: &&usize| matches!(METHODS[**method].runs, Runs::Device { tests: Tests::Near, .. });
+    let mut series = Vec::new();
+    for &method in bench.methods.iter().filter(near) {
+        let at = |resolution: [u32; 2], photons: u32, radius: f64| RenderConfig {
+            resolution,
+            photons,
+            radius: Some(radius),
+            gather: Some(method),
+            ..bench.config.clone()
+        };
+        let here = [width, height];
+        let photons = PHOTONS.into_iter().filter(|&photons| photons <= most_photons);
+        let photons = photons.map(|photons| (f64::from(photons), at(here, photons, radius)));
+        let points = SIDES.map(|factor| {
+            let resolution = here.map(|side| ((f64::from(side) * factor).round() as u32).max(1));
+            let pixels = f64::from(resolution[0]) * f64::from(resolution[1]);
+            (pixels, at(resolution, bench.config.photons, radius))
+        });
+        let radii = RADII.map(|factor| {
+            let share = factor * factor;
+            (share * 100.0, at(here, bench.config.photons, radius * factor))
+        });
+        for (against, configs) in [
+            ("photon paths", photons.collect::<Vec<_>>()),
+            ("pixels", points.to_vec()),
+            ("area within the radius, % of the automatic", radii.to_vec()),
+        ] {
+            let mut line = Series {
+                method: METHODS[method].name,
+                against,
+                points: Vec::new(),
+            };
+            for (x, config) in configs {
+                note(&format!("{}: {against} {x:.0}", METHODS[method].name));
+                line.points.push(Point {
+                    x,
+                    us: cost_us(bench, config)?,
+                });
+            }
+            series.push(line);
+        }
+    }
+    Ok(Scaling { device, series })
+}
+
+/// Microseconds of building and gathering in the first iteration.
+fn cost_us(bench: &GatherBench, config: RenderConfig) -> Result<f64> {
+    let repeats = if config.photons > REPEATED { 1 } else { bench.repeats };
+    let mut times = Vec::new();
+    // The first one warms up; each is a render of its own, whose radii haven't shrunk.
+    for repeat in 0..=repeats {
+        if repeat == 0 && repeats == 1 {
+            continue;
+        }
+        let device = Device::open(bench.device)?;
+        let mut renderer = Renderer::new(device, bench.scene, bench.camera, config.clone())?;
+        times.push(gather_us(&renderer.iterate()?));
+    }
+    let warm = usize::from(times.len() > 1);
+    Ok(median(times.split_off(warm)))
+}
+
+/// Microseconds of an iteration's launches between moving photons together and what comes after gathering.
+fn gather_us(run: &Run) -> f64 {
+    let mut gathering = false;
+    let mut us = 0.0;
+    for launch in &run.launches {
+        match launch.stage {
+            "camera" | "photons" | "direct" => gathering = false,
+            "compact" => {
+                gathering = true;
+                continue;
+            }
+            _ => (),
+        }
+        if gathering {
+            us += launch.duration_ns * 1e-3;
+        }
+    }
+    us
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_of_a_power_is_its_exponent() {
+        let points = [1.0, 10.0, 1e3].map(|x: f64| Point {
+            x,
+            us: 7.0 * x.powf(1.5),
+        });
+        let series = Series {
+            method: "m",
+            against: "x",
+            points: points.to_vec(),
+        };
+        assert!((series.slope() - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn only_building_and_gathering_counts() {
+        let launch = |stage, us: f64| crate::record::Launch {
+            stage,
+            begin_ns: 0.0,
+            duration_ns: us * 1e3,
+        };
+        let batch = [
+            launch("photons", 1.0),
+            launch("scan_blocks", 2.0),
+            launch("compact", 4.0),
+            launch("scan_blocks", 8.0),
+            launch("gather_clustered", 16.0),
+        ];
+        let mut launches = vec![launch("camera", 32.0)];
+        launches.extend(batch);
+        launches.extend(batch);
+        launches.extend([launch("direct", 64.0), launch("update", 128.0)]);
+        let run = Run {
+            launches,
+            ..Run::default()
+        };
+        assert_eq!(gather_us(&run), 48.0);
+    }
+}

@@ -1,0 +1,156 @@
+//! The benches.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+
+use super::args::{gather_method, radius, resolution};
+use super::{Outcome, print};
+use crate::bench::{self, GatherBench};
+use crate::config::{Probe, RenderConfig};
+use crate::film::{check_writable, write_png, write_whole};
+use crate::gather::{METHODS, method};
+use crate::scene::{PackedScene, Scene};
+
+/// What is measured where the user names no scene.
+const CORNELL: [(&str, &[u8]); 2] = [
+    ("cornell.gltf", include_bytes!("../../scenes/cornell.gltf")),
+    ("cornell.bin", include_bytes!("../../scenes/cornell.bin")),
+];
+
+/// `ppm-vk bench gather`.
+#[derive(Debug, Args)]
+pub struct BenchGather {
+    /// glTF file [default: the project's cornell].
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Pixels; may be given several times [default: the paper's, 320x280 and 1920x1080; with --scaling 320x280].
+    #[arg(long, value_name = "WxH", value_parser = resolution)]
+    resolution: Vec<[u32; 2]>,
+    /// Photon paths.
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    photons: u32,
+    /// Radius in scene units [default: from the photons' density].
+    #[arg(long, value_name = "R", value_parser = radius)]
+    radius: Option<f64>,
+    /// Methods, separated by commas [default: all; with --scaling those that look at nearby photons alone].
+    #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = gather_method)]
+    methods: Vec<usize>,
+    /// Photons that a cell of cluster-grid holds at the most, as in the paper [default: all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    cell_photons: Option<u32>,
+    /// How often each method runs; of its times the median counts.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    repeats: u32,
+    /// Vary photons, visible points and radius instead.
+    #[arg(long)]
+    scaling: bool,
+    /// With --scaling: photon paths at the most.
+    #[arg(long, value_name = "N", default_value_t = 10_000_000, requires = "scaling", value_parser = clap::value_parser!(u32).range(10_000..))]
+    most_photons: u32,
+    /// Write all figures as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw the figures.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write a false-colour picture of the k-means clusters, at the last resolution.
+    #[arg(long, value_name = "FILE.png", conflicts_with = "scaling")]
+    clusters: Option<PathBuf>,
+    /// Vulkan device, by a part of its name or its index [default: the best].
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+}
+
+/// Measures, prints the tables, writes the files.
+pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
+    let outputs = [&arguments.json, &arguments.plot, &arguments.clusters];
+    let outputs: Vec<&Path> = outputs.into_iter().filter_map(|file| file.as_deref()).collect();
+    for (index, file) in outputs.iter().enumerate() {
+        ensure!(!outputs[..index].contains(file), "{}: is named twice", file.display());
+        check_writable(file)?;
+    }
+    let scene = load(arguments.scene.as_deref())?;
+    let packed = PackedScene::new(&scene).map_err(anyhow::Error::msg)?;
+    let bench = GatherBench {
+        scene: &packed,
+        camera: scene.cameras.first().context("a scene without a camera")?,
+        device: arguments.device.as_deref(),
+        config: RenderConfig {
+            photons: arguments.photons,
+            radius: arguments.radius,
+            cell_photons: arguments.cell_photons,
+            ..RenderConfig::default()
+        },
+        resolutions: resolutions(arguments),
+        methods: if arguments.methods.is_empty() {
+            (0..METHODS.len()).collect()
+        } else {
+            arguments.methods.clone()
+        },
+        repeats: arguments.repeats as usize,
+    };
+    let note = |what: &str| {
+        say!("bench: {what}");
+    };
+    let (text, json, svg) = if arguments.scaling {
+        let scaling = bench::scaling(&bench, arguments.most_photons, &note)?;
+        (
+            bench::scaling_table(&scaling),
+            serde_json::to_vec_pretty(&scaling)?,
+            bench::plot_scaling(&scaling)?,
+        )
+    } else {
+        let results = bench.run(&note)?;
+        (
+            bench::tables(&results),
+            serde_json::to_vec_pretty(&results)?,
+            bench::plot_methods(&results)?,
+        )
+    };
+    if let Some(file) = &arguments.json {
+        write_whole(file, &json)?;
+    }
+    if let Some(file) = &arguments.plot {
+        write_whole(file, svg.as_bytes())?;
+    }
+    if let Some(file) = &arguments.clusters {
+        write_clusters(&bench, file)?;
+    }
+    print(&text)
+}
+
+fn resolutions(arguments: &BenchGather) -> Vec<[u32; 2]> {
+    match arguments.resolution.as_slice() {
+        [] if arguments.scaling => vec![[320, 280]],
+        [] => vec![[320, 280], [1920, 1080]],
+        given => given.to_vec(),
+    }
+}
+
+fn load(path: Option<&Path>) -> Result<Scene> {
+    if let Some(path) = path {
+        let scene = Scene::load(path)?;
+        for warning in &scene.warnings {
+            say!("warning: {warning}");
+        }
+        return Ok(scene);
+    }
+    let folder = tempfile::tempdir().context("a folder for the scene can't be made")?;
+    for (name, bytes) in CORNELL {
+        std::fs::write(folder.path().join(name), bytes).context("the scene can't be written")?;
+    }
+    Ok(Scene::load(&folder.path().join(CORNELL[0].0))?)
+}
+
+fn write_clusters(bench: &GatherBench, file: &Path) -> Result<()> {
+    let resolution = bench.resolutions.last().context("no resolution")?;
+    let mut renderer = bench.renderer(*resolution)?;
+    renderer.trace()?;
+    let cluster_grid = method("cluster-grid").context("no method cluster-grid")?;
+    renderer.gather(cluster_grid, Probe::default())?;
+    let picture = bench::cluster_picture(&mut renderer)?;
+    Ok(write_png(&picture, file, 0.0)?)
+}
