@@ -143,7 +143,7 @@ pub const SCAN_BLOCK: u32 = 2048;
 /// Keys of a tile of the radix sort.
 pub const SORT_TILE: u32 = 2048;
 /// Bits of a digit of the radix sort.
-pub const SORT_DIGIT_BITS: u32 = 4;
+pub const SORT_DIGIT_BITS: u32 = 5;
 
 /// Sizes of a render's buffers, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,4 +1,5 @@
-// What the gathers share that test every photon, or every photon of a mesh. Include after invocation.glsl and gather.glsl.
+// What the gathers share that test every photon, or every photon of a mesh. Include after gather.glsl and
+// point_groups.glsl.
 
 // Visible points in the order of PointOrder, whose workgroups have one mesh each; otherwise in that of their slots.
 layout(constant_id = 1) const bool ORDERED = false;
@@ -10,18 +11,21 @@ layout(constant_id = 3) const bool DISTANCE = false;
 layout(push_constant) uniform Push {
     uint first;  // the photons of this launch: drivers cut long loops
     uint end;
-    uint stride; // of the workgroups' visible points only every stride-th is gathered for: 1 but in a bench
+    uint stride; // only every stride-th group of visible points is gathered for: 1 but in a bench
+    uint groups; // that are gathered for
+    uint factor; // see group_of_workgroup
 } push;
 
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
-layout(std430) readonly buffer PointOrder { uint point_order[]; };
 layout(std430) readonly buffer MeshEnds { uint mesh_ends[]; }; // one past each mesh's last photon
-
-const uint NO_SLOT = 0xffffffffu;
 
 // Slot of the visible point at a place of this workgroup; NO_SLOT for a filler.
 uint slot_at(uint place) {
-    uint i = workgroup_index() * push.stride * gl_WorkGroupSize.x + place;
+    uint group = group_of_workgroup(push.groups, push.factor);
+    if (group == NO_SLOT) {
+        return NO_SLOT;
+    }
+    uint i = group * push.stride * gl_WorkGroupSize.x + place;
     if (ORDERED) {
         return i < point_order.length() ? point_order[i] : NO_SLOT;
     }

@@ -1,7 +1,7 @@
-// A stable radix sort of 4 bits a pass. A workgroup sorts a tile; each of its threads a run of the tile, one key after
+// A stable radix sort of 5 bits a pass. A workgroup sorts a tile; each of its threads a run of the tile, one key after
 // the other, which is what keeps the order of equal keys.
 
-const uint DIGITS = 16u;
+const uint DIGITS = 32u;
 const uint KEYS_PER_THREAD = 16u;
 const uint TILE_KEYS = KEYS_PER_THREAD * gl_WorkGroupSize.x;
 

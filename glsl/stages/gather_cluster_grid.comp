@@ -13,6 +13,7 @@ layout(local_size_x = 64) in;
 #include "visible_point.glsl"
 #include "statistics.glsl"
 #include "gather.glsl"
+#include "point_groups.glsl"
 #include "object_grid.glsl"
 #include "status.glsl"
 
@@ -20,21 +21,20 @@ layout(local_size_x = 64) in;
 layout(push_constant) uniform Push {
     uint first;
     uint end;
+    uint groups; // of visible points
+    uint factor; // see group_of_workgroup
 } push;
 
-layout(std430) readonly buffer PointOrder { uint point_order[]; };
 layout(std430) readonly buffer ObjectCells { uint cell_starts[]; };
 uniform usamplerBuffer SortedPhotons;
-
-const uint NO_SLOT = 0xffffffffu;
 
 shared vec3 lows[gl_WorkGroupSize.x];
 shared vec3 highs[gl_WorkGroupSize.x];
 
 void main() {
     uint me = gl_LocalInvocationID.x;
-    uint i = invocation_index();
-    uint slot = i < point_order.length() ? point_order[i] : NO_SLOT;
+    uint group = group_of_workgroup(push.groups, push.factor);
+    uint slot = group == NO_SLOT ? NO_SLOT : point_order[group * gl_WorkGroupSize.x + me];
     Receiver receiver = NO_RECEIVER;
     if (slot != NO_SLOT) {
         receiver = receiver_at(slot);

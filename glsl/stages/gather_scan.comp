@@ -13,6 +13,7 @@ layout(local_size_x = 64) in;
 #include "visible_point.glsl"
 #include "statistics.glsl"
 #include "gather.glsl"
+#include "point_groups.glsl"
 #include "exhaustive.glsl"
 
 uniform usamplerBuffer GatheredFrom;

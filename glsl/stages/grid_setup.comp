@@ -19,7 +19,7 @@ layout(std430) writeonly buffer Grid { GridShape grid; };
 layout(std430) readonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
 // c: s / R where all radii are alike. Measured, see docs/gather.md.
-const float CELLS_TO_RADIUS = 1.25;
+const float CELLS_TO_RADIUS = 1.5;
 // Render units. Positions resolve 6e-8: finer cells would gain nothing, and a visible point would reach too many of them.
 const float SMALLEST_CELL = 1.0 / 1048576.0;
 // Cells that the largest radius may span: the few points that have it must not hold up the rest.

@@ -104,10 +104,11 @@ impl Exhaustive {
             sizes.slots().div_ceil(GROUP)
         };
         let stride = sizes.probe.stride;
+        let groups = groups.div_ceil(stride);
         let photons = sizes.photon_capacity;
         for first in (0..photons).step_by(EXHAUSTIVE_RANGE as usize) {
-            let push = [first, first.saturating_add(EXHAUSTIVE_RANGE), stride];
-            let stage = gather_stage(shader, groups.div_ceil(stride) * GROUP, sizes).push(push);
+            let end = first.saturating_add(EXHAUSTIVE_RANGE);
+            let stage = gather_stage(shader, groups * GROUP, sizes).push([first, end, stride, groups, dealing(groups)]);
             let mut constants = stage.constants.to_vec();
             constants.extend([
                 ("ORDERED", u32::from(self.ordered)),
@@ -117,6 +118,14 @@ impl Exhaustive {
             recording.dispatch(stage.constants(constants).bind(vec![(BufferId::GatheredFrom, from)]));
         }
     }
+}
+
+/// A factor that deals so many groups to all cores alike: it has no divisor in common with their number.
+fn dealing(groups: u32) -> u32 {
+    [31, 37, 41, 43, 47, 53]
+        .into_iter()
+        .find(|prime| groups % prime != 0)
+        .unwrap_or(1)
 }
 
 fn gather_stage(shader: &'static Shader, threads: u32, sizes: &Sizes) -> StageDesc {
@@ -143,12 +152,11 @@ pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
     scan(BufferId::ObjectCells, cells + 1, recording);
     recording.fill(BufferId::ObjectCellCursors, 0);
     recording.dispatch(StageDesc::new(&shaders::OBJECT_CELL_SCATTER, photons));
-    in_parts(
-        &shaders::GATHER_CLUSTER_GRID,
-        sizes.order_groups() * GROUP,
-        sizes,
-        recording,
-    );
+    let groups = sizes.order_groups();
+    for [first, end] in parts(sizes) {
+        let stage = gather_stage(&shaders::GATHER_CLUSTER_GRID, groups * GROUP, sizes);
+        recording.dispatch(stage.push([first, end, groups, dealing(groups)]));
+    }
 }
 
 /// The cells of a hashed grid that a few neighbouring visible points reach.
@@ -164,14 +172,14 @@ pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
     let values = vec![(BufferId::ValuesIn, sorted.values)];
     recording.dispatch(StageDesc::new(&shaders::GRID_PHOTONS, photons).bind(values));
     let runs = sizes.slots().div_ceil(CLUSTERED_RUN);
-    in_parts(&shaders::GATHER_CLUSTERED, runs, sizes, recording);
+    for [first, end] in parts(sizes) {
+        recording.dispatch(gather_stage(&shaders::GATHER_CLUSTERED, runs, sizes).push([first, end]));
+    }
 }
 
-/// A gather that looks at the sorted photons part by part: all at once unless the driver cuts its loops.
-fn in_parts(shader: &'static Shader, threads: u32, sizes: &Sizes, recording: &mut Recording) {
-    let photons = sizes.photon_capacity;
-    let part = photons.div_ceil(sizes.gather_parts);
-    for first in (0..photons).step_by(part as usize) {
-        recording.dispatch(gather_stage(shader, threads, sizes).push([first, first.saturating_add(part)]));
-    }
+/// First and end of the photons of each of a gather's launches: one launch unless the driver cuts its loops.
+fn parts(sizes: &Sizes) -> impl Iterator<Item = [u32; 2]> {
+    let part = sizes.photon_capacity.div_ceil(sizes.gather_parts).max(1);
+    let firsts = (0..sizes.photon_capacity).step_by(part as usize);
+    firsts.map(move |first| [first, first.saturating_add(part)])
 }
