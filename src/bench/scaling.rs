@@ -15,7 +15,7 @@ use crate::record::Run;
 /// Photon paths of an iteration.
 const PHOTONS: [u32; 7] = [10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000];
 /// Factors of the picture's sides.
-const SIDES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 6.0];
+const SIDES: [f64; 5] = [0.5, 1.0, 2.0, 3.5, 5.0];
 /// Factors of the radius.
 const RADII: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 /// Photon paths up to which more than one iteration is measured.
@@ -138,6 +138,8 @@ fn cost_us(bench: &GatherBench, config: RenderConfig) -> Result<f64> {
         }
         let device = Device::open(bench.device)?;
         let mut renderer = Renderer::new(device, bench.scene, bench.camera, config.clone())?;
+        // So that the photons' buffers fit.
+        renderer.trace()?;
         times.push(gather_us(&renderer.iterate()?));
     }
     let warm = usize::from(times.len() > 1);

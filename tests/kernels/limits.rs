@@ -4,7 +4,7 @@
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Accel, Direct, RenderConfig};
 use ppm_vk::cpu::{self, Batch, Counts};
-use ppm_vk::layout::{DirectSum, VisiblePoint};
+use ppm_vk::layout::{DirectSum, Statistics, VisiblePoint};
 use ppm_vk::stage::BufferId;
 
 use super::agreement::relative_difference;
@@ -61,4 +61,35 @@ fn an_iteration_that_is_done_again_counts_once() {
             "slot {slot} after one iteration, done again {repeated} times: sum, radiance seen"
         );
     }
+}
+
+#[test]
+fn an_iteration_in_batches_gathers_what_one_batch_gathers() {
+    // Where a device binds 128 MiB, these paths' photons are two batches; on the CPU they are one.
+    let config = RenderConfig {
+        resolution: [16, 16],
+        photons: 450_000,
+        radius: Some(0.05),
+        ..small()
+    };
+    let bench = Bench::new("cornell", config.clone());
+    let mut on_device = bench.renderer;
+    let scene = super::bench::scene("cornell");
+    let mut on_cpu = cpu::Renderer::new(&bench.scene, &scene.cameras[0], config).expect("a renderer");
+    on_cpu.iterate().expect("an iteration");
+    let found: Vec<Statistics> = on_device
+        .gpu()
+        .download(BufferId::StatisticsOf, None)
+        .expect("statistics");
+    let accepted = |statistics: &[Statistics]| statistics.iter().map(|s| u64::from(s.accepted_low)).sum::<u64>();
+    let (found, expected) = (accepted(&found), accepted(on_cpu.statistics()));
+    let batches = on_device.sizes().batches(450_000);
+    println!("{found} photons accepted in {batches} batches on the device, {expected} on the CPU");
+    assert!(expected > 10_000, "{expected} photons accepted on the CPU");
+    // A few paths in ten thousand part where f32 rounds otherwise than f64.
+    let difference = relative_difference(found as f64, expected as f64);
+    assert!(
+        difference < 1e-3,
+        "{found} photons accepted in {batches} batches, {expected} in one"
+    );
 }
