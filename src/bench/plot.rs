@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 
 use super::gather::Results;
-use super::scaling::Scaling;
+use super::scaling::{Point, Scaling};
 use crate::error::{Error, Result};
 
 const COLORS: [RGBColor; 6] = [
@@ -37,8 +37,8 @@ pub fn plot_methods(results: &Results) -> Result<String> {
             methods.map(|method| method.build_and_gather_us() * 1e-3).collect()
         })
         .collect();
-    let largest = times.iter().flatten().copied().fold(1.0, f64::max) * 2.0;
-    let smallest = times.iter().flatten().copied().fold(largest, f64::min) / 2.0;
+    let range = log_range(times.iter().flatten().copied());
+    let smallest = range.start;
     let mut svg = String::new();
     {
         let height = 90 + 44 * names.len() as u32;
@@ -50,7 +50,7 @@ pub fn plot_methods(results: &Results) -> Result<String> {
             .margin(10)
             .x_label_area_size(30)
             .y_label_area_size(220)
-            .build_cartesian_2d((smallest..largest).log_scale(), 0.0..names.len() as f64)
+            .build_cartesian_2d(range, 0.0..names.len() as f64)
             .map_err(drawing)?;
         chart
             .configure_mesh()
@@ -65,7 +65,7 @@ pub fn plot_methods(results: &Results) -> Result<String> {
             let [width, height] = result.resolution;
             let bars = times.iter().enumerate().map(|(row, &time)| {
                 let top = (names.len() - row) as f64 - 0.1 - thickness * index as f64;
-                Rectangle::new([(smallest, top), (time, top - thickness)], color.filled())
+                Rectangle::new([(smallest, top), (time.log10(), top - thickness)], color.filled())
             });
             chart
                 .draw_series(bars)
@@ -93,8 +93,18 @@ pub fn plot_methods(results: &Results) -> Result<String> {
     Ok(svg)
 }
 
-/// A tick of a logarithmic axis.
-fn label(value: f64) -> String {
+/// Range of an axis of decimal logarithms. (plotters' own logarithmic axis never ends for some ranges.)
+fn log_range(values: impl Iterator<Item = f64> + Clone) -> std::ops::Range<f64> {
+    let low = values.clone().fold(f64::INFINITY, f64::min);
+    let high = values.fold(0.0, f64::max);
+    low.log10() - 0.2..high.log10() + 0.2
+}
+
+/// A tick of an axis of decimal logarithms.
+fn label(logarithm: f64) -> String {
+    let value = 10f64.powf(logarithm);
+    let digits = 10f64.powf(1.0 - logarithm.floor());
+    let value = (value * digits).round() / digits;
     if (0.001..100_000.0).contains(&value) {
         format!("{value}")
     } else {
@@ -121,19 +131,14 @@ pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
                 .filter(|series| series.against == *against)
                 .collect();
             let points = || lines.iter().flat_map(|series| &series.points);
-            let range = |values: Vec<f64>| {
-                let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-                let high = values.iter().copied().fold(0.0, f64::max);
-                (low / 1.5..high * 1.5).log_scale()
-            };
             let mut chart = ChartBuilder::on(panel)
                 .caption(format!("ms against {against}"), ("sans-serif", 15))
                 .margin(10)
                 .x_label_area_size(30)
                 .y_label_area_size(50)
                 .build_cartesian_2d(
-                    range(points().map(|point| point.x).collect()),
-                    range(points().map(|point| point.us * 1e-3).collect()),
+                    log_range(points().map(|point| point.x)),
+                    log_range(points().map(|point| point.us * 1e-3)),
                 )
                 .map_err(drawing)?;
             chart
@@ -144,7 +149,8 @@ pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
                 .map_err(drawing)?;
             for (index, series) in lines.iter().enumerate() {
                 let color = COLORS[index % COLORS.len()];
-                let points: Vec<(f64, f64)> = series.points.iter().map(|point| (point.x, point.us * 1e-3)).collect();
+                let logarithms = |point: &Point| (point.x.log10(), (point.us * 1e-3).log10());
+                let points: Vec<(f64, f64)> = series.points.iter().map(logarithms).collect();
                 chart
                     .draw_series(LineSeries::new(points, color.stroke_width(2)).point_size(3))
                     .map_err(drawing)?

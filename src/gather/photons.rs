@@ -124,7 +124,7 @@ impl Exhaustive {
 fn dealing(groups: u32) -> u32 {
     [31, 37, 41, 43, 47, 53]
         .into_iter()
-        .find(|prime| groups % prime != 0)
+        .find(|prime| !groups.is_multiple_of(*prime))
         .unwrap_or(1)
 }
 
