@@ -9,6 +9,7 @@ macro_rules! say {
 
 mod args;
 mod bench;
+mod compare;
 mod interrupt;
 mod list;
 mod progress;
@@ -40,6 +41,7 @@ pub fn run() -> Result<Outcome> {
         None => render::render(&arguments.render),
         Some(Command::Devices { json }) => print(&list::devices(json)?),
         Some(Command::Bench(args::Bench::Gather(arguments))) => bench::gather(&arguments),
+        Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Gathers) => print(&list::gathers()?),
         Some(Command::Inspect { scene, json }) => print(&list::inspect(&scene, json)?),
     }

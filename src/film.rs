@@ -8,7 +8,7 @@ mod png;
 
 pub use files::{check_writable, write_whole};
 pub use openexr::{read_exr, write_exr};
-pub use png::write_png;
+pub use png::{write_png, write_rgb8};
 
 /// A picture of linear RGB radiance with Rec. 709 primaries.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::bench::BenchGather;
+use super::compare::Compare;
 use crate::config::{Accel, Direct, Estimator};
 use crate::gather;
 
@@ -38,6 +39,8 @@ pub enum Command {
     /// Measure.
     #[command(subcommand)]
     Bench(Bench),
+    /// Say how far a picture is from a reference.
+    Compare(Compare),
     /// Say what a scene holds.
     Inspect {
         /// glTF file (.gltf or .glb).

@@ -13,8 +13,6 @@ use std::path::Path;
 /// # Errors
 /// As [`check_writable`](super::check_writable); further if the disk is full.
 pub fn write_png(image: &Image, path: &Path, exposure_ev: f32) -> Result<()> {
-    let cannot_encode = |what: String| Error::file(path, format!("can't be encoded as PNG: {what}"));
-    let side = |pixels: usize| u32::try_from(pixels).map_err(|error| cannot_encode(error.to_string()));
     let gain = exposure_ev.exp2();
     let bytes: Vec<u8> = image
         .pixels
@@ -22,15 +20,19 @@ pub fn write_png(image: &Image, path: &Path, exposure_ev: f32) -> Result<()> {
         .flat_map(|pixel| tone_map(pixel.map(|radiance| radiance * gain)))
         .map(|intensity| (srgb_transfer(intensity) * 255.0).round() as u8)
         .collect();
+    write_rgb8([image.width, image.height], &bytes, path)
+}
 
+/// Writes a PNG of these bytes: sRGB, three a pixel, in rows from the top left.
+///
+/// # Errors
+/// As [`write_png`].
+pub fn write_rgb8(size: [usize; 2], bytes: &[u8], path: &Path) -> Result<()> {
+    let cannot_encode = |what: String| Error::file(path, format!("can't be encoded as PNG: {what}"));
+    let side = |pixels: usize| u32::try_from(pixels).map_err(|error| cannot_encode(error.to_string()));
     let mut file = Vec::new();
     image::codecs::png::PngEncoder::new(&mut file)
-        .write_image(
-            &bytes,
-            side(image.width)?,
-            side(image.height)?,
-            image::ExtendedColorType::Rgb8,
-        )
+        .write_image(bytes, side(size[0])?, side(size[1])?, image::ExtendedColorType::Rgb8)
         .map_err(|error| cannot_encode(error.to_string()))?;
     write_whole(path, &file)
 }

@@ -1,4 +1,4 @@
-//! `ppm-vk bench`, on a small picture.
+//! `ppm-vk bench` and `ppm-vk compare`, on small pictures.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -86,4 +86,28 @@ fn the_scaling_bench_reports_slopes() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let text = String::from_utf8_lossy(&output.stdout);
     assert_eq!(text.matches("slope of the log-log line").count(), 3, "{text}");
+}
+
+#[test]
+fn compare_measures_a_picture_against_its_reference() {
+    let folder = TempDir::new().expect("folder");
+    let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/references/cornell.exr");
+    let equal = ppm_vk(
+        folder.path(),
+        &["compare", reference, reference, "--json", "--heatmap", "e.png"],
+    );
+    assert_eq!(equal.status.code(), Some(0), "{}", stderr(&equal));
+    let value: serde_json::Value = serde_json::from_slice(&equal.stdout).expect("JSON");
+    for key in ["rmse", "rel_mse", "mae", "flip"] {
+        assert!(value[key].as_f64().expect(key) < 1e-6, "{key}: {value}");
+    }
+    assert_eq!(value["mean_ratio"][1], 1.0);
+    assert!(
+        std::fs::read(folder.path().join("e.png"))
+            .expect("PNG")
+            .starts_with(b"\x89PNG")
+    );
+    let missing = ppm_vk(folder.path(), &["compare", "nothing.exr", reference]);
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(stderr(&missing).contains("nothing.exr"), "{}", stderr(&missing));
 }

@@ -1,5 +1,7 @@
 //! How far a picture is from a reference, and whether it has values that no picture should have.
 
+mod flip;
+
 use crate::error::{Error, Result};
 use crate::film::Image;
 
@@ -9,7 +11,7 @@ const REL_MSE_FLOOR: f64 = 0.01;
 /// Error measures of a picture x against a reference r; each is a mean over all pixels and channels.
 ///
 /// NaN in the picture or the reference makes them NaN: [`Defects`] says where that comes from.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Comparison {
     /// Root of the mean squared error, in units of radiance.
     pub rmse: f64,
@@ -20,6 +22,27 @@ pub struct Comparison {
     pub mae: f64,
     /// The picture's mean over the reference's, for red, green and blue.
     pub mean_ratio: [f64; 3],
+}
+
+pub use flip::flip;
+
+/// (x − r)² / (r² + 0.01·m²) of each pixel, the mean over its channels.
+///
+/// # Errors
+/// As [`compare`].
+pub fn relative_errors(image: &Image, reference: &Image) -> Result<Vec<f32>> {
+    compare(image, reference)?;
+    let floor = REL_MSE_FLOOR * (mean(reference).iter().sum::<f64>() / 3.0).powi(2);
+    let pixels = image.pixels().iter().zip(reference.pixels());
+    Ok(pixels
+        .map(|(x, r)| {
+            let terms = x.iter().zip(r).map(|(&x, &r)| {
+                let (x, r) = (f64::from(x), f64::from(r));
+                (x - r).powi(2) / (r * r + floor)
+            });
+            (terms.sum::<f64>() / 3.0) as f32
+        })
+        .collect())
 }
 
 /// Pixels with values that no picture should have in any of their channels; a pixel may count in several.
