@@ -57,7 +57,7 @@ pub struct Counters {
     pub lost_photons: u64,
     /// Grid cells that had more photons than their maximum, in all iterations.
     pub full_cells: u64,
-    /// Iterations done again because photons didn't fit.
+    /// Iterations done again because photons didn't fit or the driver cut loops short.
     pub repeated_iterations: u64,
 }
 

@@ -138,6 +138,8 @@ pub const LLOYD_ROUNDS: u32 = 4;
 pub const CLUSTERED_RUN: u32 = 8;
 /// Workgroups that sum up the radii.
 pub const RADIUS_GROUPS: u32 = 256;
+/// The radius of every how many slots they look at: odd, so that it meets each of a pixel's slots.
+pub const RADIUS_STEP: u32 = 7;
 /// Numbers of a block of the prefix sum.
 pub const SCAN_BLOCK: u32 = 2048;
 /// Keys of a tile of the radix sort.
@@ -250,6 +252,7 @@ impl Sizes {
             probe: Probe::default(),
         };
         sizes.set_lanes(limits.lanes);
+        sizes.shrink_batch(&limits);
         sizes
     }
 
@@ -272,7 +275,7 @@ impl Sizes {
     /// Makes room for what didn't fit.
     pub fn grow(&mut self, lane_need: u32, batch_need: u32) {
         if lane_need > self.lane_capacity {
-            self.lane_capacity = with_room(lane_need);
+            self.lane_capacity = lane_need.saturating_add(lane_need / 4 + 1);
         }
         if batch_need > self.photon_capacity {
             self.photon_capacity = with_room(batch_need);
@@ -368,5 +371,42 @@ impl Sizes {
     /// Batches of an iteration of `paths` photon paths.
     pub fn batches(&self, paths: u32) -> u32 {
         paths.div_ceil(self.batch_paths)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn photon_buffers_stay_within_what_a_device_binds() {
+        for (photons, storage_buffer_bytes, lanes) in [
+            (300_000, 128 << 20, 1 << 18),
+            (10_000_000, 2 << 30, 1 << 18),
+            (10_000_000, 128 << 20, 4096),
+            (1, 1 << 20, 1 << 18),
+        ] {
+            let config = RenderConfig {
+                photons,
+                ..RenderConfig::default()
+            };
+            let limits = Limits {
+                storage_buffer_bytes,
+                loop_limit: u32::MAX,
+                lanes,
+                glass: false,
+                meshes: 5,
+                object_cells: 500,
+            };
+            let sizes = Sizes::new(&config, limits);
+            for id in [BufferId::LanePhotons, BufferId::Photons, BufferId::SortedPhotons] {
+                let bytes = sizes.bytes(id).expect("a size");
+                assert!(
+                    bytes <= storage_buffer_bytes,
+                    "{photons} paths, {lanes} lanes: {id:?} has {bytes} bytes of {storage_buffer_bytes}"
+                );
+            }
+            assert!(sizes.batches(photons) * sizes.batch_paths >= photons);
+        }
     }
 }

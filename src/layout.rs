@@ -8,7 +8,7 @@ pub const NO_OBJECT: u32 = u32::MAX;
 /// Light of a triangle that doesn't emit.
 pub const NO_LIGHT: u32 = u32::MAX;
 
-/// Bit of [`StatusCounters::again`]: a lane's photons didn't fit.
+/// Bit of [`StatusCounters::again`]: a lane's photons or a batch's didn't fit.
 pub const PHOTONS_DID_NOT_FIT: u32 = 1;
 /// Bit of [`StatusCounters::again`]: a lane's paths need more loop iterations than the driver gives.
 pub const LANES_TOO_LONG: u32 = 2;
@@ -210,10 +210,10 @@ device_structs! {
         pub radius2: f32,
         /// Σ 1/R².
         pub inverse2: f32,
-        /// The largest R².
-        pub largest2: f32,
         /// Visible points.
         pub count: u32,
+        /// Zero.
+        pub padding: u32,
     }
 
     /// The hashed grid of an iteration.

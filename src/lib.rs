@@ -19,6 +19,7 @@ pub mod cli;
 pub mod config;
 pub mod cpu;
 pub mod error;
+pub mod estimate;
 pub mod film;
 pub mod gather;
 pub mod gpu;

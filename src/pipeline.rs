@@ -107,6 +107,8 @@ pub struct Renderer {
     photon_need: [u32; 2],
     /// Whether the photons' buffers fit what photons need.
     fitted: bool,
+    /// Launches that a gather outside a render is dealt to, for each of [`METHODS`].
+    parts_of_methods: Vec<u32>,
 }
 
 /// How often an iteration is done at the most: every other time halves what its loops have to do.
@@ -123,7 +125,24 @@ impl Renderer {
     ///
     /// # Errors
     /// A setting outside its range, a device without enough memory, or a failed Vulkan call.
-    pub fn new(mut device: Device, scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
+    pub fn new(device: Device, scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
+        let summary = device.summary();
+        let bindable = summary.max_storage_buffer_bytes.min(16 * u64::from(summary.max_texels));
+        Self::within(bindable, device, scene, camera, config)
+    }
+
+    /// As [`Renderer::new`], with photon buffers of no more than `buffer_bytes` each: an iteration that needs more is done
+    /// in batches.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn within(
+        buffer_bytes: u64,
+        mut device: Device,
+        scene: &PackedScene,
+        camera: &Camera,
+        config: RenderConfig,
+    ) -> Result<Self> {
         config.check()?;
         let method = &METHODS[config.gather.unwrap_or_else(default_method)];
         if method.stages().is_none() {
@@ -133,7 +152,7 @@ impl Renderer {
             )));
         }
         let limits = Limits {
-            storage_buffer_bytes: device.summary().max_storage_buffer_bytes,
+            storage_buffer_bytes: buffer_bytes,
             loop_limit: loop_budget(device.loop_limit()),
             lanes: if device.summary().kind == "cpu" { 4096 } else { 1 << 18 },
             glass: scene.has_glass(),
@@ -167,6 +186,7 @@ impl Renderer {
             counters: Counters::default(),
             photon_need: [0, 0],
             fitted: false,
+            parts_of_methods: vec![1; METHODS.len()],
         };
         renderer.upload_settings()?;
         // Before any work: memory that lacks is told now and not after an hour.
@@ -283,8 +303,9 @@ impl Renderer {
     /// # Errors
     /// As [`Backend::iterate`].
     pub fn gather(&mut self, method: usize, probe: Probe) -> Result<(Run, StatusCounters)> {
-        self.sizes.probe = probe;
-        self.run_until_it_fits(|stages| {
+        let render = (self.sizes.gather_parts, self.sizes.probe);
+        (self.sizes.gather_parts, self.sizes.probe) = (self.parts_of_methods[method], probe);
+        let result = self.run_until_it_fits(|stages| {
             let mut recording = reporting();
             recording.fill(BufferId::GatheredOf, 0);
             recording.fill(BufferId::TestsOf, 0);
@@ -292,7 +313,10 @@ impl Renderer {
             order(stages.sizes, &mut recording);
             gather(stages.sizes, &mut recording);
             recording
-        })
+        });
+        self.parts_of_methods[method] = self.sizes.gather_parts;
+        (self.sizes.gather_parts, self.sizes.probe) = render;
+        result
     }
 
     /// The buffers' sizes.

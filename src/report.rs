@@ -231,7 +231,7 @@ mod tests {
         let subject = Subject {
             scene: "s".into(),
             resolution: [1, 1],
-            gather: "grid".into(),
+            gather: "naive".into(),
             photons: 1,
             device: DeviceDescription {
                 name: "d".into(),

@@ -82,7 +82,7 @@ pub enum BufferId {
     ProbeFrom,
     /// Where it copies it to.
     ProbeTo,
-    /// Photons tested for each slot, u32, where they are counted.
+    /// Photons tested for each slot, u32, where they are counted; the highest bit says that the slot had its turn.
     TestsOf,
     /// Sort keys, u32.
     Keys,

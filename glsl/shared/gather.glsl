@@ -7,6 +7,7 @@ uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer StatisticsOf;
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot, where they are counted
+const uint GATHERED_FOR = 0x80000000u;           // and whether it was its turn
 
 // The gather's side of a visible point.
 struct Receiver {
@@ -33,9 +34,10 @@ float squared_distance(vec3 a, vec3 b) {
 
 // The one predicate of every gather: on the same object, within R, and arriving on the side that the viewer sees.
 bool accepts(Receiver receiver, Photon photon) {
+    precise float cosine = dot(decode_octahedral(floatBitsToUint(photon.flux_direction.w)), receiver.normal);
     return squared_distance(photon.position_object.xyz, receiver.position) <= receiver.radius2 &&
            floatBitsToUint(photon.position_object.w) == receiver.object &&
-           dot(decode_octahedral(floatBitsToUint(photon.flux_direction.w)), receiver.normal) < 0.0;
+           cosine < 0.0;
 }
 
 // A receiver's part of this launch.
@@ -49,6 +51,6 @@ void add_gathered(uint slot, Sum sum, uint tested) {
     gathered[slot].flux_count =
         vec4(before.rgb + sum.flux, uintBitsToFloat(floatBitsToUint(before.w) + sum.count));
     if (COUNT_TESTS) {
-        tests[slot] += tested;
+        tests[slot] = (tests[slot] + tested) | GATHERED_FOR;
     }
 }

@@ -3,7 +3,7 @@
 shared RadiusSum terms[gl_WorkGroupSize.x];
 
 RadiusSum together(RadiusSum a, RadiusSum b) {
-    return RadiusSum(a.radius2 + b.radius2, a.inverse2 + b.inverse2, max(a.largest2, b.largest2), a.count + b.count);
+    return RadiusSum(a.radius2 + b.radius2, a.inverse2 + b.inverse2, a.count + b.count, 0u);
 }
 
 // Adds up one term of each invocation; right in the first one. Every invocation has to call it.

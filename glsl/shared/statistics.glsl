@@ -24,6 +24,6 @@ struct DirectSum {
 struct RadiusSum {
     float radius2;  // Σ R²
     float inverse2; // Σ 1/R²
-    float largest2; // the largest R²
     uint count;
+    uint padding;
 };

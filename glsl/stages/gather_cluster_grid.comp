@@ -61,12 +61,14 @@ void main() {
     Sum sum = Sum(vec3(0.0), 0u);
     uint to_test = 0u;
     uint tested = 0u;
+    uint rows = 0u;
     for (uint z = low.z; z <= high.z; z++) {
         for (uint y = low.y; y <= high.y; y++) {
             // Cells along x follow each other, and so do their photons.
             uint first = max(cell_starts[cell_number(grid, uvec3(low.x, y, z))], push.first);
             uint end = min(cell_starts[cell_number(grid, uvec3(high.x, y, z)) + 1u], push.end);
             to_test += max(end, first) - first;
+            rows += 1u;
             for (uint i = first; i < end; i++) {
                 Photon photon = PHOTON(SortedPhotons, i);
                 tested += 1u;
@@ -78,7 +80,7 @@ void main() {
         }
     }
     // Loops that didn't reach their end were cut by the driver: the gather is done again in smaller parts.
-    if (tested != to_test) {
+    if (tested != to_test || rows != (high.y - low.y + 1u) * (high.z - low.z + 1u)) {
         atomicOr(status.again, GATHERS_TOO_LONG);
     }
     add_gathered(slot, sum, tested);

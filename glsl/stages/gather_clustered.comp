@@ -61,8 +61,16 @@ void main() {
         pending[k] = receivers[k].object != NO_OBJECT;
         any_pending = any_pending || pending[k];
     }
+    // What the loops have to do, and have done.
+    uint points = 0u;
+    uint points_done = 0u;
+    uint rows = 0u;
+    uint rows_done = 0u;
     uint to_test = 0u;
     uint tested = 0u;
+    for (uint k = 0u; k < RUN; k++) {
+        points += pending[k] ? 1u : 0u;
+    }
     while (any_pending) {
         // The first point that is left, and those whose cells reach no more than one farther than it or they do alone.
         any_pending = false;
@@ -81,12 +89,15 @@ void main() {
             cluster[k] = receivers[k];
             cluster[k].radius2 = joins ? receivers[k].radius2 : -1.0;
             chosen = chosen || leads;
+            points_done += joins ? 1u : 0u;
             pending[k] = pending[k] && !joins;
             any_pending = any_pending || pending[k];
         }
         uint tested_before = tested;
         ivec3 first_row = row_of(low);
         ivec3 last_row = row_of(high);
+        ivec3 extent = last_row - first_row + 1;
+        rows += uint(extent.x * extent.y * extent.z);
         ivec3 row = first_row;
         bool more;
         // Loops that test at their end: some drivers carry out a loop's body once more than its condition holds.
@@ -110,6 +121,7 @@ void main() {
                 tested += i < end ? 1u : 0u;
                 i += 1u;
             } while (i < end);
+            rows_done += 1u;
             bool end_x = row.x == last_row.x;
             bool end_y = end_x && row.y == last_row.y;
             more = !(end_y && row.z == last_row.z);
@@ -123,7 +135,7 @@ void main() {
         }
     }
     // Loops that didn't reach their end were cut by the driver: the gather is done again in smaller parts.
-    if (tested != to_test || any_pending) {
+    if (tested != to_test || rows_done != rows || points_done != points) {
         atomicOr(status.again, GATHERS_TOO_LONG);
     }
     for (uint k = 0u; k < RUN; k++) {

@@ -18,6 +18,7 @@ layout(local_size_x = 64) in;
 uniform usamplerBuffer GatheredFrom;
 
 shared Photon block[gl_WorkGroupSize.x];
+shared uint receivers; // visible points of the workgroup
 
 void main() {
     uint me = gl_LocalInvocationID.x;
@@ -26,13 +27,21 @@ void main() {
     if (slot != NO_SLOT) {
         receiver = receiver_at(slot);
     }
+    if (me == 0u) {
+        receivers = 0u;
+    }
+    barrier();
+    if (receiver.object != NO_OBJECT) {
+        atomicAdd(receivers, 1u);
+    }
+    barrier();
     // The whole workgroup stages the same photons: all, or those of the mesh of its first visible point and so of all.
     uint object = 0u;
     if (BY_MESH) {
         uint first_slot = slot_at(0u);
         object = first_slot == NO_SLOT ? NO_OBJECT : floatBitsToUint(TEXEL(VisiblePoints, 3u * first_slot).w);
     }
-    uvec2 range = photons_to_test(object);
+    uvec2 range = receivers > 0u ? photons_to_test(object) : uvec2(0u);
     float radius = sqrt(max(receiver.radius2, 0.0));
     Sum sum = Sum(vec3(0.0), 0u);
     for (uint first = range.x; first < range.y; first += gl_WorkGroupSize.x) {

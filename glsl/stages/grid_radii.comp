@@ -21,12 +21,12 @@ uniform usamplerBuffer StatisticsOf;
 layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
 
 void main() {
-    RadiusSum term = RadiusSum(0.0, 0.0, 0.0, 0u);
+    RadiusSum term = RadiusSum(0.0, 0.0, 0u, 0u);
     uint step = push.groups * gl_WorkGroupSize.x * push.step;
     for (uint slot = invocation_index() * push.step; slot < slots(); slot += step) {
         if (floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w) != NO_OBJECT) {
             float radius2 = TEXEL(StatisticsOf, 3u * slot).x;
-            term = together(term, RadiusSum(radius2, 1.0 / radius2, radius2, 1u));
+            term = together(term, RadiusSum(radius2, 1.0 / radius2, 1u, 0u));
         }
     }
     RadiusSum sum = reduce(term);

@@ -22,11 +22,12 @@ layout(std430) readonly buffer RadiusSums { RadiusSum radius_sums[]; };
 const float CELLS_TO_RADIUS = 1.5;
 // Render units. Positions resolve 6e-8: finer cells would gain nothing, and a visible point would reach too many of them.
 const float SMALLEST_CELL = 1.0 / 1048576.0;
-// Cells that the largest radius may span: the few points that have it must not hold up the rest.
+// Cells that the initial radius, the largest there is, may span: the few points in the dark that keep it must not hold up
+// the rest. It holds so few photons that cells of that size are nearly empty.
 const float MOST_CELLS = 16.0;
 
 void main() {
-    RadiusSum term = RadiusSum(0.0, 0.0, 0.0, 0u);
+    RadiusSum term = RadiusSum(0.0, 0.0, 0u, 0u);
     for (uint i = gl_LocalInvocationID.x; i < push.count; i += gl_WorkGroupSize.x) {
         term = together(term, radius_sums[i]);
     }
@@ -34,7 +35,7 @@ void main() {
     if (gl_LocalInvocationID.x == 0u) {
         // Without a visible point the sums are 0, and any size will do.
         float balanced = all.count > 0u ? CELLS_TO_RADIUS * sqrt(sqrt(all.radius2 / all.inverse2)) : 1.0;
-        float cell_size = max(max(balanced, sqrt(all.largest2) / MOST_CELLS), SMALLEST_CELL);
+        float cell_size = max(max(balanced, sqrt(settings.initial_radius2) / MOST_CELLS), SMALLEST_CELL);
         grid.inverse_cell_size = 1.0 / cell_size;
     }
 }

@@ -17,7 +17,7 @@ pub const CPU_NAIVE: f64 = 68_000.0;
 /// A row of tables 3 and 4: our method's name, the paper's row, the gather at both resolutions.
 pub type Row = (&'static str, &'static str, [f64; 2]);
 
-/// Table 3, and the two last rows' times after distance() was replaced by hand (section 8).
+/// Table 3, and its last row's times after distance() was replaced by hand (section 8).
 pub const TABLE_3: [Row; 6] = [
     ("naive", "Naive solution", [2041.0, 38_603.0]),
     ("local", "Local memory", [1109.0, 17_750.0]),

@@ -138,7 +138,7 @@ pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
                 .y_label_area_size(50)
                 .build_cartesian_2d(
                     log_range(points().map(|point| point.x)),
-                    log_range(points().map(|point| point.us * 1e-3)),
+                    log_range(points().map(|point| point.cost_us * 1e-3)),
                 )
                 .map_err(drawing)?;
             chart
@@ -149,12 +149,12 @@ pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
                 .map_err(drawing)?;
             for (index, series) in lines.iter().enumerate() {
                 let color = COLORS[index % COLORS.len()];
-                let logarithms = |point: &Point| (point.x.log10(), (point.us * 1e-3).log10());
+                let logarithms = |point: &Point| (point.x.log10(), (point.cost_us * 1e-3).log10());
                 let points: Vec<(f64, f64)> = series.points.iter().map(logarithms).collect();
                 chart
                     .draw_series(LineSeries::new(points, color.stroke_width(2)).point_size(3))
                     .map_err(drawing)?
-                    .label(format!("{}, slope {:.2}", series.method, series.slope()))
+                    .label(format!("{}, slope {:.2}", series.method, series.slope))
                     .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
             }
             chart

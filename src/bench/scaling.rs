@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::gather::GatherBench;
 use super::median;
 use crate::backend::{Backend, DeviceDescription};
-use crate::config::RenderConfig;
+use crate::config::{Probe, RenderConfig};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, Tests};
 use crate::gpu::Device;
@@ -39,6 +39,8 @@ pub struct Series {
     pub against: &'static str,
     /// In growing order.
     pub points: Vec<Point>,
+    /// Slope of the line through the points, in logarithms, by least squares.
+    pub slope: f64,
 }
 
 /// A measured cost.
@@ -47,13 +49,16 @@ pub struct Point {
     /// The quantity.
     pub x: f64,
     /// Microseconds of building and gathering in an iteration.
-    pub us: f64,
+    pub cost_us: f64,
 }
 
 impl Series {
-    /// Slope of the line through the points, in logarithms, by least squares.
-    pub fn slope(&self) -> f64 {
-        let logs: Vec<(f64, f64)> = self.points.iter().map(|point| (point.x.ln(), point.us.ln())).collect();
+    fn fit(&mut self) {
+        let logs: Vec<(f64, f64)> = self
+            .points
+            .iter()
+            .map(|point| (point.x.ln(), point.cost_us.ln()))
+            .collect();
         let count = logs.len() as f64;
         let (mean_x, mean_y) = (
             logs.iter().map(|log| log.0).sum::<f64>() / count,
@@ -61,7 +66,7 @@ impl Series {
         );
         let covariance: f64 = logs.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
         let variance: f64 = logs.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
-        covariance / variance
+        self.slope = covariance / variance;
     }
 }
 
@@ -83,8 +88,15 @@ pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> R
         .unwrap_or(f64::from(renderer.radius()) / bench.scene.scale);
     drop(renderer);
     let near = |method: &&usize| matches!(METHODS[**method].runs, Runs::Device { tests: Tests::Near, .. });
+    let methods: Vec<usize> = bench.methods.iter().filter(near).copied().collect();
+    if methods.is_empty() {
+        return Err(Error::Config(
+            "--scaling: none of these --methods looks at nearby photons alone; try clustered or cluster-grid"
+                .to_owned(),
+        ));
+    }
     let mut series = Vec::new();
-    for &method in bench.methods.iter().filter(near) {
+    for method in methods {
         let at = |resolution: [u32; 2], photons: u32, radius: f64| RenderConfig {
             resolution,
             photons,
@@ -113,14 +125,16 @@ pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> R
                 method: METHODS[method].name,
                 against,
                 points: Vec::new(),
+                slope: f64::NAN,
             };
             for (x, config) in configs {
                 note(&format!("{}: {against} {x:.0}", METHODS[method].name));
                 line.points.push(Point {
                     x,
-                    us: cost_us(bench, config)?,
+                    cost_us: cost_us(bench, config)?,
                 });
             }
+            line.fit();
             series.push(line);
         }
     }
@@ -138,8 +152,12 @@ fn cost_us(bench: &GatherBench, config: RenderConfig) -> Result<f64> {
         }
         let device = Device::open(bench.device)?;
         let mut renderer = Renderer::new(device, bench.scene, bench.camera, config.clone())?;
-        // So that the photons' buffers fit.
+        // So that the photons' buffers fit and the kernels are there.
         renderer.trace()?;
+        if let Some(method) = config.gather {
+            renderer.trace()?;
+            renderer.gather(method, Probe::default())?;
+        }
         times.push(gather_us(&renderer.iterate()?));
     }
     let warm = usize::from(times.len() > 1);
@@ -174,14 +192,16 @@ mod tests {
     fn the_slope_of_a_power_is_its_exponent() {
         let points = [1.0, 10.0, 1e3].map(|x: f64| Point {
             x,
-            us: 7.0 * x.powf(1.5),
+            cost_us: 7.0 * x.powf(1.5),
         });
-        let series = Series {
+        let mut series = Series {
             method: "m",
             against: "x",
             points: points.to_vec(),
+            slope: f64::NAN,
         };
-        assert!((series.slope() - 1.5).abs() < 1e-12);
+        series.fit();
+        assert!((series.slope - 1.5).abs() < 1e-12);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::config::{GROUP, NO_SLOT};
 use crate::cpu::pixel_of;
 use crate::error::Result;
 use crate::film::Image;
+use crate::layout::StatusCounters;
 use crate::pipeline::Renderer;
 use crate::stage::BufferId;
 
@@ -50,10 +51,14 @@ pub struct Structure {
     pub clusters: Option<Clusters>,
     /// Photons of a cell, empty ones left out, where the method has a grid.
     pub cell_photons: Option<Spread>,
+    /// Photons beyond the maximum that the user set for a cell.
+    pub lost_photons: u32,
+    /// Cells that had more than that maximum.
+    pub full_cells: u32,
 }
 
 /// What the method that gathered last has left on the device.
-pub fn structure(renderer: &mut Renderer, method: &str) -> Result<Structure> {
+pub fn structure(renderer: &mut Renderer, method: &str, status: &StatusCounters) -> Result<Structure> {
     let ordered = method.starts_with("hitpoint-sort") || method.starts_with("cluster") && method != "clustered";
     let cells = match method {
         "cluster-grid" => Some((BufferId::ObjectCells, renderer.sizes().object_cells as usize)),
@@ -61,6 +66,8 @@ pub fn structure(renderer: &mut Renderer, method: &str) -> Result<Structure> {
         _ => None,
     };
     Ok(Structure {
+        lost_photons: status.lost_photons,
+        full_cells: status.full_cells,
         clusters: if ordered {
             Some(clusters(renderer, method.starts_with("cluster"))?)
         } else {

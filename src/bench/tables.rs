@@ -188,7 +188,7 @@ fn methods(result: &ResolutionResult, copy_bytes_per_s: f64) -> String {
             shares.join(", ")
         );
     }
-    text += "order: visible points, when they are new; build: photons; b + g: build and gather. GB/s: what invocations load and\n\
+    text += "order: visible points, when they are new; build: photons; b + g: build and gather; clearing buffers isn't timed. GB/s: what invocations load and\n\
              store; caches serve part of it, so that it can exceed what a copy moves.\n";
     for method in &result.methods {
         text += &structure(method);
@@ -221,6 +221,13 @@ fn structure(method: &MethodResult) -> String {
             method.method, cells.number, cells.min, cells.max, cells.median
         );
     }
+    if method.structure.full_cells > 0 {
+        let _ = writeln!(
+            text,
+            "{}: {} cells had more photons than --cell-photons allows; {} photons were lost",
+            method.method, method.structure.full_cells, method.structure.lost_photons
+        );
+    }
     text
 }
 
@@ -247,9 +254,9 @@ pub fn scaling_table(scaling: &Scaling) -> String {
             summary(series.method)
         );
         for point in &series.points {
-            let _ = writeln!(text, "{:>14.0} {:>12}", point.x, ms(Some(point.us)));
+            let _ = writeln!(text, "{:>14.0} {:>12}", point.x, ms(Some(point.cost_us)));
         }
-        let _ = writeln!(text, "slope of the log-log line {:.2}", series.slope());
+        let _ = writeln!(text, "slope of the log-log line {:.2}", series.slope);
     }
     text
 }

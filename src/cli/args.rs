@@ -122,7 +122,8 @@ pub struct RenderArguments {
     /// Bounces of a camera or photon path at the most.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: u32,
-    /// Seed: the same one on the same device gives the same picture, bit for bit.
+    /// Seed: the same one on the same device gives the same picture, bit for bit (but for the paper's gathers that order
+    /// photons by atomic counters).
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
     /// Vulkan device, by a part of its name or its index [default: the best].

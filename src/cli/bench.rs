@@ -4,9 +4,10 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use clap::Args;
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory};
 
-use super::args::{gather_method, radius, resolution};
+use super::args::{Arguments, gather_method, radius, resolution};
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
 use crate::config::{Probe, RenderConfig};
@@ -48,7 +49,7 @@ pub struct BenchGather {
     #[arg(long)]
     scaling: bool,
     /// With --scaling: photon paths at the most.
-    #[arg(long, value_name = "N", default_value_t = 10_000_000, requires = "scaling", value_parser = clap::value_parser!(u32).range(10_000..))]
+    #[arg(long, value_name = "N", default_value_t = 10_000_000, requires = "scaling", value_parser = clap::value_parser!(u32).range(31_623..))]
     most_photons: u32,
     /// Write all figures as JSON.
     #[arg(long, value_name = "FILE")]
@@ -66,6 +67,10 @@ pub struct BenchGather {
 
 /// Measures, prints the tables, writes the files.
 pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
+    if arguments.scaling && arguments.resolution.len() > 1 {
+        let text = "--scaling starts from one --resolution";
+        Arguments::command().error(ErrorKind::ArgumentConflict, text).exit();
+    }
     let outputs = [&arguments.json, &arguments.plot, &arguments.clusters];
     let outputs: Vec<&Path> = outputs.into_iter().filter_map(|file| file.as_deref()).collect();
     for (index, file) in outputs.iter().enumerate() {
@@ -95,31 +100,32 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
     let note = |what: &str| {
         say!("bench: {what}");
     };
-    let (text, json, svg) = if arguments.scaling {
+    // What took minutes to measure is printed first: nothing that comes after can lose it.
+    let (json, plot): (Vec<u8>, Box<dyn Fn() -> crate::error::Result<String>>) = if arguments.scaling {
         let scaling = bench::scaling(&bench, arguments.most_photons, &note)?;
+        print(&bench::scaling_table(&scaling))?;
         (
-            bench::scaling_table(&scaling),
             serde_json::to_vec_pretty(&scaling)?,
-            bench::plot_scaling(&scaling)?,
+            Box::new(move || bench::plot_scaling(&scaling)),
         )
     } else {
         let results = bench.run(&note)?;
+        print(&bench::tables(&results))?;
         (
-            bench::tables(&results),
             serde_json::to_vec_pretty(&results)?,
-            bench::plot_methods(&results)?,
+            Box::new(move || bench::plot_methods(&results)),
         )
     };
     if let Some(file) = &arguments.json {
         write_whole(file, &json)?;
     }
     if let Some(file) = &arguments.plot {
-        write_whole(file, svg.as_bytes())?;
+        write_whole(file, plot()?.as_bytes())?;
     }
     if let Some(file) = &arguments.clusters {
         write_clusters(&bench, file)?;
     }
-    print(&text)
+    Ok(Outcome::Done)
 }
 
 fn resolutions(arguments: &BenchGather) -> Vec<[u32; 2]> {

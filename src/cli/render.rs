@@ -132,6 +132,8 @@ fn choose_backend(arguments: &RenderArguments) -> (BackendChoice, usize) {
     };
     let conflict = if backend != of_method(method) {
         Some("this --gather doesn't run on this --backend; leave one of them out")
+    } else if arguments.cell_photons.is_some() && METHODS[method].name != "cluster-grid" {
+        Some("--cell-photons is of --gather cluster-grid")
     } else if backend == BackendChoice::Cpu && arguments.device.is_some() {
         Some("the CPU backend has no --device")
     } else {

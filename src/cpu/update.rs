@@ -73,21 +73,20 @@ pub fn radius_sums(
     statistics: &[Statistics],
     [groups, size, step]: [usize; 3],
 ) -> Vec<RadiusSum> {
-    let mut sums = vec![(0.0f64, 0.0f64, 0.0f32, 0u32); groups];
+    let mut sums = vec![(0.0f64, 0.0f64, 0u32); groups];
     for (slot, (point, statistics)) in visible_points.iter().zip(statistics).step_by(step).enumerate() {
         if word(point.position_object) != NO_OBJECT {
-            let (radius2, inverse2, largest2, count) = &mut sums[slot / size % groups];
+            let (radius2, inverse2, count) = &mut sums[slot / size % groups];
             *radius2 += f64::from(statistics.radius2_high);
             *inverse2 += 1.0 / f64::from(statistics.radius2_high);
-            *largest2 = largest2.max(statistics.radius2_high);
             *count += 1;
         }
     }
-    let to_sum = |(radius2, inverse2, largest2, count)| RadiusSum {
+    let to_sum = |(radius2, inverse2, count)| RadiusSum {
         radius2: radius2 as f32,
         inverse2: inverse2 as f32,
-        largest2,
         count,
+        padding: 0,
     };
     sums.into_iter().map(to_sum).collect()
 }

@@ -113,13 +113,13 @@ pub const METHODS: &[GatherMethod] = &[
     GatherMethod {
         name: "hitpoint-sort-local",
         summary: "the same through shared memory, by a squared distance",
-        paper: "section 8, 125 ms and 1 941 ms; table 4, «Hitpoint sorting, local memory»",
+        paper: "section 8, 125 ms and 1 941 ms",
         runs: device(points::by_mesh, photons::ordered_mesh_local, Tests::All, GROUP),
     },
     GatherMethod {
         name: "cluster",
         summary: "visible points in k-means clusters within their mesh, with fillers; shared memory",
-        paper: "section 8, clusters without a grid (33 % fillers)",
+        paper: "table 4, «Hitpoint sorting, local memory» (33 % fillers)",
         runs: device(points::by_cluster, photons::ordered_mesh_local, Tests::All, GROUP),
     },
     GatherMethod {

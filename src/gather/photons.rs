@@ -1,7 +1,7 @@
 //! Orders of photons, and gathering from them: what is recorded for each batch of photons.
 
 use super::primitives::{PHOTON_PAIRS, scan, sort};
-use crate::config::{CLUSTERED_RUN, EXHAUSTIVE_RANGE, GROUP, RADIUS_GROUPS, Sizes};
+use crate::config::{CLUSTERED_RUN, EXHAUSTIVE_RANGE, GROUP, RADIUS_GROUPS, RADIUS_STEP, Sizes};
 use crate::record::Recording;
 use crate::shaders;
 use crate::stage::{BufferId, Shader, StageDesc};
@@ -163,7 +163,7 @@ pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
 pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
     let photons = sizes.photon_capacity;
     let radius_threads = RADIUS_GROUPS * shaders::GRID_RADII.workgroup;
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, radius_threads).push([RADIUS_GROUPS, CLUSTERED_RUN]));
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, radius_threads).push([RADIUS_GROUPS, RADIUS_STEP]));
     recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup).push(RADIUS_GROUPS));
     recording.fill(BufferId::CellStarts, 0);
     recording.dispatch(StageDesc::new(&shaders::GRID_KEYS, photons));

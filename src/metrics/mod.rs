@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::film::Image;
 
 /// The weight of the squared mean in relMSE's denominator, which keeps dark pixels from deciding it.
-const REL_MSE_FLOOR: f64 = 0.01;
+pub const REL_MSE_FLOOR: f64 = 0.01;
 
 /// Error measures of a picture x against a reference r; each is a mean over all pixels and channels.
 ///

@@ -4,7 +4,9 @@
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Accel, Direct, RenderConfig};
 use ppm_vk::cpu::{self, Batch, Counts};
+use ppm_vk::gpu::Device;
 use ppm_vk::layout::{DirectSum, Statistics, VisiblePoint};
+use ppm_vk::pipeline::Renderer;
 use ppm_vk::stage::BufferId;
 
 use super::agreement::relative_difference;
@@ -65,31 +67,44 @@ fn an_iteration_that_is_done_again_counts_once() {
 
 #[test]
 fn an_iteration_in_batches_gathers_what_one_batch_gathers() {
-    // Where a device binds 128 MiB, these paths' photons are two batches; on the CPU they are one.
     let config = RenderConfig {
-        resolution: [16, 16],
-        photons: 450_000,
-        radius: Some(0.05),
+        resolution: [32, 32],
+        photons: 60_000,
+        radius: Some(0.1),
         ..small()
     };
-    let bench = Bench::new("cornell", config.clone());
-    let mut on_device = bench.renderer;
-    let scene = super::bench::scene("cornell");
-    let mut on_cpu = cpu::Renderer::new(&bench.scene, &scene.cameras[0], config).expect("a renderer");
-    on_cpu.iterate().expect("an iteration");
-    let found: Vec<Statistics> = on_device
-        .gpu()
-        .download(BufferId::StatisticsOf, None)
-        .expect("statistics");
-    let accepted = |statistics: &[Statistics]| statistics.iter().map(|s| u64::from(s.accepted_low)).sum::<u64>();
-    let (found, expected) = (accepted(&found), accepted(on_cpu.statistics()));
-    let batches = on_device.sizes().batches(450_000);
-    println!("{found} photons accepted in {batches} batches on the device, {expected} on the CPU");
-    assert!(expected > 10_000, "{expected} photons accepted on the CPU");
-    // A few paths in ten thousand part where f32 rounds otherwise than f64.
-    let difference = relative_difference(found as f64, expected as f64);
-    assert!(
-        difference < 1e-3,
-        "{found} photons accepted in {batches} batches, {expected} in one"
-    );
+    let loaded = super::bench::scene("cornell-spheres");
+    let scene = super::bench::packed(&loaded);
+    let render = |buffer_bytes: u64| {
+        let device = Device::open(None).expect("a device");
+        let camera = &loaded.cameras[0];
+        let mut renderer = Renderer::within(buffer_bytes, device, &scene, camera, config.clone()).expect("a renderer");
+        for _ in 0..2 {
+            renderer.iterate().expect("an iteration");
+        }
+        let statistics: Vec<Statistics> = renderer
+            .gpu()
+            .download(BufferId::StatisticsOf, None)
+            .expect("statistics");
+        (renderer.sizes().batches(60_000), statistics)
+    };
+    let (one, expected) = render(64 << 20);
+    let (several, found) = render(2 << 20);
+    assert!(one == 1 && several > 4, "{one} and {several} batches");
+    let accepted: u64 = expected.iter().map(|s| u64::from(s.accepted_low)).sum();
+    assert!(accepted > 100_000, "{accepted} photons accepted");
+    for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        assert_eq!(
+            found.accepted_low, expected.accepted_low,
+            "slot {slot}: photons accepted in {several} batches, in one"
+        );
+        for channel in 0..3 {
+            let (found, expected) = (found.flux_high[channel], expected.flux_high[channel]);
+            let difference = relative_difference(found.into(), expected.into());
+            assert!(
+                difference < 1e-5,
+                "slot {slot}: τ {found} in {several} batches, {expected} in one"
+            );
+        }
+    }
 }
