@@ -362,7 +362,10 @@ impl Measured {
         // Where cells have a maximum, their method loses photons; its result says how many.
         let loses = renderer.sizes().cell_photons.is_some() && METHODS[method].name == "cluster-grid";
         let (mut seen, mut accepted) = (0, 0.0);
-        for slot in (0..tests.len()).filter(|&slot| tests[slot] & GATHERED_FOR != 0) {
+        for (slot, point) in input.points.iter().enumerate() {
+            if object(point) == NO_OBJECT || tests[slot] & GATHERED_FOR == 0 {
+                continue;
+            }
             seen += 1;
             let (found, expected) = (count_of(&gathered[slot]), input.expected[slot]);
             accepted += f64::from(found);
