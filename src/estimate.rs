@@ -11,7 +11,7 @@ use crate::film::Image;
 use crate::metrics::REL_MSE_FLOOR;
 
 /// Batches at the most; then neighbours are joined. Even, so that the halves are alike.
-const MOST_BATCHES: usize = 12;
+const MOST_BATCHES: usize = 8;
 /// Batches from which an estimate is made.
 const FEWEST_BATCHES: usize = 4;
 

@@ -88,12 +88,15 @@ pub struct RenderArguments {
     /// Camera, by name or index [default: the scene's first].
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
-    /// Stop after so many iterations [default: 64 if there is no --time].
+    /// Stop after so many iterations [default: 64 if there is neither --time nor --target-error].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub iterations: Option<u32>,
     /// Stop after so many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub time: Option<Duration>,
+    /// Stop when the estimated relative error (root of relMSE) is no larger than this.
+    #[arg(long, value_name = "E", value_parser = error)]
+    pub target_error: Option<f64>,
     /// Photon paths emitted in an iteration.
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub photons: u32,
@@ -174,6 +177,15 @@ pub fn radius(text: &str) -> Result<f64, String> {
     let radius = number(text)?;
     if radius > 0.0 && radius.is_finite() {
         Ok(radius)
+    } else {
+        Err("must be above 0".to_owned())
+    }
+}
+
+fn error(text: &str) -> Result<f64, String> {
+    let error = number(text)?;
+    if error > 0.0 && error.is_finite() {
+        Ok(error)
     } else {
         Err("must be above 0".to_owned())
     }

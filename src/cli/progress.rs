@@ -13,18 +13,25 @@ pub struct Limits {
     pub iterations: Option<u32>,
     /// After so much time.
     pub time: Option<Duration>,
+    /// When the estimated relative error is no larger than this.
+    pub error: Option<f64>,
 }
 
 impl Limits {
-    /// The part of the render that is done, 0 to 1.
-    pub fn done(&self, iterations: u32, elapsed: Duration) -> f64 {
+    /// The part of the render that is done, 0 to 1. `error` is the estimated relative error, where there is one.
+    pub fn done(&self, iterations: u32, elapsed: Duration, error: Option<f64>) -> f64 {
         let by_iterations = self
             .iterations
             .map_or(0.0, |limit| f64::from(iterations) / f64::from(limit));
         let by_time = self
             .time
             .map_or(0.0, |limit| elapsed.as_secs_f64() / limit.as_secs_f64());
-        by_iterations.max(by_time).min(1.0)
+        // Errors fall about as the cube root of the iterations.
+        let by_error = self
+            .error
+            .zip(error)
+            .map_or(0.0, |(limit, error)| (limit / error.max(f64::MIN_POSITIVE)).powi(3));
+        by_iterations.max(by_time).max(by_error).min(1.0)
     }
 }
 
@@ -57,9 +64,9 @@ impl Progress {
     }
 
     /// Shows where the render is.
-    pub fn show(&self, backend: &dyn Backend) {
+    pub fn show(&self, backend: &dyn Backend, error: Option<f64>) {
         let elapsed = self.start.elapsed();
-        let done = self.limits.done(backend.iterations(), elapsed);
+        let done = self.limits.done(backend.iterations(), elapsed, error);
         self.bar.set_position((done * STEPS as f64) as u64);
         let seconds = elapsed.as_secs_f64().max(1e-9);
         let of = self
@@ -67,8 +74,9 @@ impl Progress {
             .iterations
             .map_or(String::new(), |limit| format!("/{limit}"));
         let left = if done > 0.0 { seconds * (1.0 - done) / done } else { 0.0 };
+        let error = error.map_or(String::new(), |error| format!(", error about {:.1} %", 100.0 * error));
         self.bar.set_message(format!(
-            "{}{of} iterations, {} photon paths/s, {} left",
+            "{}{of} iterations{error}, {} photon paths/s, {} left",
             backend.iterations(),
             with_prefix(backend.emitted() as f64 / seconds),
             clock(left)

@@ -13,6 +13,7 @@ use super::progress::{Limits, Progress, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
 use crate::config::RenderConfig;
+use crate::estimate::ErrorEstimate;
 use crate::film::{self, Metadata};
 use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
@@ -57,36 +58,47 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
 
     let start = Instant::now();
     let limits = Limits {
-        iterations: arguments
-            .iterations
-            .or(arguments.time.is_none().then_some(DEFAULT_ITERATIONS)),
+        iterations: arguments.iterations.or_else(|| {
+            let endless = arguments.time.is_none() && arguments.target_error.is_none();
+            endless.then_some(DEFAULT_ITERATIONS)
+        }),
         time: arguments.time,
+        error: arguments.target_error,
     };
     let progress = Progress::new(limits, arguments.quiet);
     let mut profile = Profile::default();
     let profiled = arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some();
-    while limits.done(backend.iterations(), start.elapsed()) < 1.0 && !(interrupt::asked() && backend.iterations() > 0)
+    let mut estimate = ErrorEstimate::new(config.alpha);
+    let mut error = None;
+    while limits.done(backend.iterations(), start.elapsed(), error) < 1.0
+        && !(interrupt::asked() && backend.iterations() > 0)
     {
         let run = backend.iterate()?;
         // A day's launches are gigabytes.
         if profiled {
             profile.add(run);
         }
-        progress.show(backend.as_ref());
+        let iterations = backend.iterations();
+        if estimate.wants(iterations) {
+            estimate.add(iterations, backend.resolve()?);
+            error = estimate.relative(iterations).map(|error| error.total);
+        }
+        progress.show(backend.as_ref(), error);
     }
     let seconds = start.elapsed().as_secs_f64();
     progress.finish();
 
     let image = backend.resolve()?;
+    let estimated = estimate.relative(backend.iterations());
     let metadata = Metadata {
         iterations: u64::from(backend.iterations()),
         photons_emitted: backend.emitted(),
         seed: u64::from(arguments.seed),
         device: backend.device().name,
         seconds,
-        estimated_error: None,
+        estimated_error: estimated.map(|error| error.total),
     };
-    film::write_exr(&image, &output, &metadata)?;
+    film::write_exr(&image, estimate.standard_errors().as_ref(), &output, &metadata)?;
     if let Some(png) = &arguments.png {
         film::write_png(&image, png, arguments.exposure)?;
     }
@@ -94,7 +106,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         say!("warning: {warning}");
     }
     say!(
-        "{}: {}x{}, {} iterations, {} photon paths, {seconds:.1} s ({} photon paths/s) on {}",
+        "{}: {}x{}, {} iterations, {} photon paths, {seconds:.1} s ({} photon paths/s) on {}{}",
         output.display(),
         image.width(),
         image.height(),
@@ -102,6 +114,12 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         backend.emitted(),
         with_prefix(backend.emitted() as f64 / seconds),
         backend.device().name,
+        estimated.map_or(String::new(), |error| format!(
+            "; relative error about {:.2} % (noise {:.2} %, bias {:.2} %)",
+            100.0 * error.total,
+            100.0 * error.noise,
+            100.0 * error.bias
+        )),
     );
     let subject = Subject {
         scene: scene.name.clone(),

@@ -6,10 +6,11 @@ use exr::image::read::image::ReadLayers;
 use exr::image::read::layers::ReadChannels;
 use exr::image::read::specific_channels::ReadSpecificChannel;
 use exr::image::write::WritableImage;
-use exr::image::{Blocks, Encoding, Layer, SpecificChannels};
+use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Layer};
 use exr::math::Vec2;
 use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
 use exr::meta::header::{Header, LayerAttributes};
+use exr::prelude::SmallVec;
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
@@ -53,7 +54,10 @@ fn custom_attributes(metadata: &Metadata) -> HashMap<Text, AttributeValue> {
 ///
 /// # Errors
 /// As [`check_writable`](super::check_writable); further if the disk is full.
-pub fn write_exr(image: &Image, path: &Path, metadata: &Metadata) -> Result<()> {
+///
+/// `errors`, if given, are written as channels `error.R`, `error.G`, `error.B`: the standard error of each pixel, as the
+/// render estimated it.
+pub fn write_exr(image: &Image, errors: Option<&Image>, path: &Path, metadata: &Metadata) -> Result<()> {
     let attributes = LayerAttributes {
         software_name: Some(Text::from(concat!("ppm-vk ", env!("CARGO_PKG_VERSION")))),
         other: custom_attributes(metadata),
@@ -64,12 +68,20 @@ pub fn write_exr(image: &Image, path: &Path, metadata: &Metadata) -> Result<()> 
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let channels = SpecificChannels::rgb(|Vec2(x, y): Vec2<usize>| {
-        let [r, g, b] = image.pixels[y * image.width + x];
-        (r, g, b)
-    });
+    let plane = |name: &str, of: &Image, channel: usize| {
+        let samples: Vec<f32> = of.pixels.iter().map(|pixel| pixel[channel]).collect();
+        AnyChannel::new(name, FlatSamples::F32(samples))
+    };
+    let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
+    for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
+        channels.push(plane(name, image, channel));
+        if let Some(errors) = errors {
+            channels.push(plane(&format!("error.{name}"), errors, channel));
+        }
+    }
     let size = (image.width, image.height);
-    let mut picture = exr::image::Image::from_layer(Layer::new(size, attributes, encoding, channels));
+    let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
+    let mut picture = exr::image::Image::from_layer(layer);
     picture.attributes.chromaticities = Some(REC_709);
 
     let mut file = Vec::new();
@@ -230,7 +242,7 @@ mod tests {
     fn written(image: &Image, metadata: &Metadata) -> (TempDir, PathBuf) {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("out.exr");
-        write_exr(image, &path, metadata).expect("an EXR file");
+        write_exr(image, None, &path, metadata).expect("an EXR file");
         (folder, path)
     }
 
