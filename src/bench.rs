@@ -1,8 +1,9 @@
-//! Benches: the gather methods on one device against each other and against the paper.
+//! Benches: the gather methods on one device against each other and against the paper, and error against time.
 //!
 //! All figures of a bench come from one process. Methods take turns, so that what else the machine does meets them all;
 //! times are device timestamps, and of repeated runs the median counts.
 
+mod converge;
 mod gather;
 mod paper;
 mod plot;
@@ -10,8 +11,9 @@ mod scaling;
 mod structure;
 mod tables;
 
+pub use converge::{Converge, Convergence, Curve, Measured, converge, converge_table, csv, seconds_to};
 pub use gather::{GatherBench, MethodResult, ResolutionResult, Results, StepTimes};
-pub use plot::{plot_methods, plot_scaling};
+pub use plot::{plot_convergence, plot_methods, plot_scaling};
 pub use scaling::{Point, Scaling, Series, scaling};
 pub use structure::{Clusters, Spread, Structure, cluster_picture};
 pub use tables::{scaling_table, tables};
@@ -24,5 +26,27 @@ fn median(mut values: Vec<f64>) -> f64 {
         0 => f64::NAN,
         count if count % 2 == 1 => values[middle],
         _ => 0.5 * (values[middle - 1] + values[middle]),
+    }
+}
+
+/// Slope of the line through the points, in logarithms, by least squares; NaN with fewer than two.
+fn log_slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let logs: Vec<(f64, f64)> = points.map(|(x, y)| (x.ln(), y.ln())).collect();
+    let count = logs.len() as f64;
+    let (mean_x, mean_y) = (
+        logs.iter().map(|log| log.0).sum::<f64>() / count,
+        logs.iter().map(|log| log.1).sum::<f64>() / count,
+    );
+    let covariance: f64 = logs.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
+    let variance: f64 = logs.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
+    covariance / variance
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_slope_of_a_power_is_its_exponent() {
+        let points = [1.0, 10.0, 1e3].map(|x: f64| (x, 7.0 * x.powf(1.5)));
+        assert!((super::log_slope(points.into_iter()) - 1.5).abs() < 1e-12);
     }
 }

@@ -10,6 +10,7 @@ macro_rules! say {
 mod args;
 mod bench;
 mod compare;
+mod converge;
 mod interrupt;
 mod list;
 mod progress;
@@ -42,6 +43,7 @@ pub fn run() -> Result<Outcome> {
         Some(Command::Devices { json }) => print(&list::devices(json)?),
         Some(Command::Bench(args::Bench::Gather(arguments))) => bench::gather(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
+        Some(Command::Converge(arguments)) => converge::run(&arguments),
         Some(Command::Gathers) => print(&list::gathers()?),
         Some(Command::Inspect { scene, json }) => print(&list::inspect(&scene, json)?),
     }

@@ -137,8 +137,9 @@ impl ErrorEstimate {
 
     /// The mean picture's bias over the difference between its halves': bias goes with R², and R² with i^(α−1).
     fn bias_per_drift(&self, iterations: f64) -> f64 {
-        // The mean of i^(α−1) up to n is n^(α−1)/α.
-        let up_to = |n: f64| n.powf(self.alpha);
+        // The sum of i^(α−1) up to n, by the trapezoidal rule.
+        let alpha = self.alpha;
+        let up_to = |n: f64| (n.powf(alpha) - 1.0) / alpha + 0.5 * (1.0 + n.powf(alpha - 1.0));
         let half = 0.5 * iterations;
         let (early, late) = (up_to(half) / half, (up_to(iterations) - up_to(half)) / half);
         up_to(iterations) / iterations / (early - late)

@@ -111,3 +111,118 @@ fn compare_measures_a_picture_against_its_reference() {
     assert_eq!(missing.status.code(), Some(1));
     assert!(stderr(&missing).contains("nothing.exr"), "{}", stderr(&missing));
 }
+
+#[test]
+fn converge_follows_the_error_of_each_setting() {
+    let folder = TempDir::new().expect("folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.gltf");
+    let rendered = ppm_vk(
+        folder.path(),
+        &[
+            "--scene",
+            scene,
+            "--resolution",
+            "16x14",
+            "--photons",
+            "2000",
+            "--iterations",
+            "300",
+            "-o",
+            "reference.exr",
+        ],
+    );
+    assert_eq!(rendered.status.code(), Some(0), "{}", stderr(&rendered));
+    let output = ppm_vk(
+        folder.path(),
+        &[
+            "converge",
+            "--scene",
+            scene,
+            "--reference",
+            "reference.exr",
+            "--time",
+            "0.4",
+            "--photons",
+            "2000",
+            "--seed",
+            "1",
+            "--vary",
+            "direct",
+            "--csv",
+            "c.csv",
+            "--plot",
+            "c.svg",
+        ],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let csv = std::fs::read_to_string(folder.path().join("c.csv")).expect("CSV");
+    let columns = csv.lines().next().expect("a heading").split(',').count();
+    let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert!(rows.iter().all(|row| row.len() == columns), "{csv}");
+    for setting in ["direct light", "direct photons"] {
+        let errors = rows
+            .iter()
+            .filter(|row| row[0] == setting)
+            .map(|row| row[4].parse::<f64>().expect("relMSE"));
+        let errors: Vec<f64> = errors.collect();
+        assert!(
+            errors.len() > 2 && errors[errors.len() - 1] < errors[0],
+            "{setting}: {errors:?}"
+        );
+    }
+    assert!(
+        std::fs::read_to_string(folder.path().join("c.svg"))
+            .expect("SVG")
+            .contains("</svg>")
+    );
+}
+
+#[test]
+fn a_render_stops_at_the_target_error_and_writes_its_estimate() {
+    let folder = TempDir::new().expect("folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.gltf");
+    let render = |target: &str| {
+        let output = ppm_vk(
+            folder.path(),
+            &[
+                "--scene",
+                scene,
+                "--resolution",
+                "32x28",
+                "--photons",
+                "5000",
+                "--target-error",
+                target,
+                "-o",
+                "p.exr",
+            ],
+        );
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let text = stderr(&output);
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let before = |what: &str| {
+            let index = words
+                .iter()
+                .position(|word| word.starts_with(what))
+                .expect("the summary");
+            words[index - 1].parse::<f64>().expect("a number")
+        };
+        let about = words.iter().position(|word| *word == "about").expect("an estimate");
+        (before("iterations"), words[about + 1].parse::<f64>().expect("an error"))
+    };
+    let (coarse, coarse_error) = render("0.5");
+    let (fine, fine_error) = render("0.05");
+    assert!(
+        coarse_error <= 50.0 && fine_error <= 5.0,
+        "{coarse_error} %, {fine_error} %"
+    );
+    assert!(
+        coarse == 16.0 && fine > coarse,
+        "{coarse} iterations, {fine} iterations"
+    );
+    let file = std::fs::read(folder.path().join("p.exr")).expect("EXR");
+    for name in ["estimatedError", "error.R", "error.G", "error.B"] {
+        let found = file.windows(name.len()).any(|bytes| bytes == name.as_bytes());
+        assert!(found, "no {name} in the picture");
+    }
+}

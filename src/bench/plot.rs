@@ -2,6 +2,7 @@
 
 use plotters::prelude::*;
 
+use super::converge::Convergence;
 use super::gather::Results;
 use super::scaling::{Point, Scaling};
 use crate::error::{Error, Result};
@@ -95,8 +96,10 @@ pub fn plot_methods(results: &Results) -> Result<String> {
 
 /// Range of an axis of decimal logarithms. (plotters' own logarithmic axis never ends for some ranges.)
 fn log_range(values: impl Iterator<Item = f64> + Clone) -> std::ops::Range<f64> {
-    let low = values.clone().fold(f64::INFINITY, f64::min);
-    let high = values.fold(0.0, f64::max);
+    // Whatever is measured, an axis has finite ends.
+    let drawn = values.filter(|value| *value > 0.0 && value.is_finite());
+    let low = drawn.clone().fold(1e300, f64::min);
+    let high = drawn.fold(1e-300, f64::max).max(low);
     low.log10() - 0.2..high.log10() + 0.2
 }
 
@@ -165,6 +168,59 @@ pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
                 .draw()
                 .map_err(drawing)?;
         }
+        area.present().map_err(drawing)?;
+    }
+    Ok(svg)
+}
+
+/// relMSE against the device's seconds, a line for each setting, on logarithmic scales.
+///
+/// # Errors
+/// A drawing that fails.
+pub fn plot_convergence(convergence: &Convergence) -> Result<String> {
+    let points = || convergence.curves.iter().flat_map(|curve| &curve.points);
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, (800, 560)).into_drawing_area();
+        area.fill(&WHITE).map_err(drawing)?;
+        let mut chart = ChartBuilder::on(&area)
+            .caption(
+                format!("relMSE against seconds: {}", convergence.device.name),
+                ("sans-serif", 16),
+            )
+            .margin(10)
+            .x_label_area_size(30)
+            .y_label_area_size(60)
+            .build_cartesian_2d(
+                log_range(points().map(|point| point.device_s)),
+                log_range(points().map(|point| point.rel_mse)),
+            )
+            .map_err(drawing)?;
+        chart
+            .configure_mesh()
+            .x_label_formatter(&|x| label(*x))
+            .y_label_formatter(&|y| label(*y))
+            .draw()
+            .map_err(drawing)?;
+        for (index, curve) in convergence.curves.iter().enumerate() {
+            let color = COLORS[index % COLORS.len()];
+            let line = curve
+                .points
+                .iter()
+                .map(|point| (point.device_s.log10(), point.rel_mse.log10()));
+            chart
+                .draw_series(LineSeries::new(line, color.stroke_width(2)).point_size(3))
+                .map_err(drawing)?
+                .label(format!("{}, slope {:.2}", curve.setting, curve.slope))
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::LowerLeft)
+            .background_style(WHITE.mix(0.8))
+            .border_style(BLACK)
+            .draw()
+            .map_err(drawing)?;
         area.present().map_err(drawing)?;
     }
     Ok(svg)

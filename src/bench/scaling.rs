@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::gather::GatherBench;
-use super::median;
+use super::{log_slope, median};
 use crate::backend::{Backend, DeviceDescription};
 use crate::config::{Probe, RenderConfig};
 use crate::error::{Error, Result};
@@ -50,24 +50,6 @@ pub struct Point {
     pub x: f64,
     /// Microseconds of building and gathering in an iteration.
     pub cost_us: f64,
-}
-
-impl Series {
-    fn fit(&mut self) {
-        let logs: Vec<(f64, f64)> = self
-            .points
-            .iter()
-            .map(|point| (point.x.ln(), point.cost_us.ln()))
-            .collect();
-        let count = logs.len() as f64;
-        let (mean_x, mean_y) = (
-            logs.iter().map(|log| log.0).sum::<f64>() / count,
-            logs.iter().map(|log| log.1).sum::<f64>() / count,
-        );
-        let covariance: f64 = logs.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
-        let variance: f64 = logs.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
-        self.slope = covariance / variance;
-    }
 }
 
 /// Measures the cost of those of the bench's methods that look at nearby photons alone, at its first resolution, with the
@@ -134,7 +116,7 @@ pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> R
                     cost_us: cost_us(bench, config)?,
                 });
             }
-            line.fit();
+            line.slope = log_slope(line.points.iter().map(|point| (point.x, point.cost_us)));
             series.push(line);
         }
     }
@@ -187,22 +169,6 @@ fn gather_us(run: &Run) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_slope_of_a_power_is_its_exponent() {
-        let points = [1.0, 10.0, 1e3].map(|x: f64| Point {
-            x,
-            cost_us: 7.0 * x.powf(1.5),
-        });
-        let mut series = Series {
-            method: "m",
-            against: "x",
-            points: points.to_vec(),
-            slope: f64::NAN,
-        };
-        series.fit();
-        assert!((series.slope - 1.5).abs() < 1e-12);
-    }
 
     #[test]
     fn only_building_and_gathering_counts() {

@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::bench::BenchGather;
 use super::compare::Compare;
+use super::converge::ConvergeArguments;
 use crate::config::{Accel, Direct, Estimator};
 use crate::gather;
 
@@ -39,6 +40,8 @@ pub enum Command {
     /// Measure.
     #[command(subcommand)]
     Bench(Bench),
+    /// Measure error against time.
+    Converge(Box<ConvergeArguments>),
     /// Say how far a picture is from a reference.
     Compare(Compare),
     /// Say what a scene holds.
@@ -94,7 +97,7 @@ pub struct RenderArguments {
     /// Stop after so many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub time: Option<Duration>,
-    /// Stop when the estimated relative error (root of relMSE) is no larger than this.
+    /// Stop when the estimated relative error (root of relMSE) is no larger than this, from iteration 16 on.
     #[arg(long, value_name = "E", value_parser = error)]
     pub target_error: Option<f64>,
     /// Photon paths emitted in an iteration.
@@ -191,7 +194,7 @@ fn error(text: &str) -> Result<f64, String> {
     }
 }
 
-fn seconds(text: &str) -> Result<Duration, String> {
+pub fn seconds(text: &str) -> Result<Duration, String> {
     match Duration::try_from_secs_f64(number(text)?) {
         Ok(time) if !time.is_zero() => Ok(time),
         Ok(_) => Err("must be above 0".to_owned()),

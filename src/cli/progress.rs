@@ -6,6 +6,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::backend::Backend;
 
+/// Iterations from which an estimated error may end a render: fewer have too little to tell it from.
+const TRUSTED_FROM: u32 = 16;
+
 /// When a render stops.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
@@ -30,6 +33,7 @@ impl Limits {
         let by_error = self
             .error
             .zip(error)
+            .filter(|_| iterations >= TRUSTED_FROM)
             .map_or(0.0, |(limit, error)| (limit / error.max(f64::MIN_POSITIVE)).powi(3));
         by_iterations.max(by_time).max(by_error).min(1.0)
     }

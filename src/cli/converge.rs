@@ -1,0 +1,158 @@
+//! Error against time.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, ValueEnum};
+
+use super::args::seconds;
+use super::{Outcome, print};
+use crate::bench::{Converge, converge, converge_table, csv, plot_convergence};
+use crate::config::{Direct, Estimator, RenderConfig};
+use crate::film::{check_writable, read_exr, write_whole};
+use crate::gather::{METHODS, Runs, Tests};
+use crate::scene::{PackedScene, Scene};
+
+/// `ppm-vk converge`.
+#[derive(Debug, Args)]
+pub struct ConvergeArguments {
+    /// glTF file.
+    #[arg(long, value_name = "FILE")]
+    scene: PathBuf,
+    /// OpenEXR picture that it should become; its size is rendered.
+    #[arg(long, value_name = "FILE")]
+    reference: PathBuf,
+    /// Seconds of rendering, for each setting.
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds)]
+    time: std::time::Duration,
+    /// What differs between the curves; without it there is one, of the defaults.
+    #[arg(long, value_enum)]
+    vary: Option<Vary>,
+    /// Photon paths emitted in an iteration.
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    photons: u32,
+    /// Seed.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u32,
+    /// Write the curves as comma-separated values.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw the curves.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Camera, by name or index [default: the scene's first].
+    #[arg(long, value_name = "NAME|INDEX")]
+    camera: Option<String>,
+    /// Vulkan device, by a part of its name or its index [default: the best].
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+}
+
+/// What differs between curves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Vary {
+    /// The defaults, and the paper's setting: ppm, direct light by photons.
+    Paper,
+    /// Gather methods that look at nearby photons alone.
+    Gather,
+    /// α of 0.5, 2/3, 0.8, 0.95.
+    Alpha,
+    /// A tenth of, as many, and ten times as many photon paths an iteration.
+    Photons,
+    /// sppm and ppm.
+    Estimator,
+    /// Direct light by sampling the lights, and by photons.
+    Direct,
+}
+
+fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfig)> {
+    let with = |name: &str, change: &dyn Fn(&mut RenderConfig)| {
+        let mut config = base.clone();
+        change(&mut config);
+        (name.to_owned(), config)
+    };
+    match vary {
+        None => vec![with("defaults", &|_| ())],
+        Some(Vary::Paper) => vec![
+            with("defaults", &|_| ()),
+            with("paper", &|config| {
+                config.estimator = Estimator::Ppm;
+                config.direct = Direct::Photons;
+            }),
+        ],
+        Some(Vary::Gather) => METHODS
+            .iter()
+            .enumerate()
+            .filter(|(_, method)| matches!(method.runs, Runs::Device { tests: Tests::Near, .. }))
+            .map(|(index, method)| with(method.name, &|config| config.gather = Some(index)))
+            .collect(),
+        Some(Vary::Alpha) => [
+            ("alpha 2/3", 2.0 / 3.0),
+            ("alpha 0.5", 0.5),
+            ("alpha 0.8", 0.8),
+            ("alpha 0.95", 0.95),
+        ]
+        .map(|(name, alpha)| with(name, &|config| config.alpha = alpha))
+        .into(),
+        Some(Vary::Photons) => {
+            let counts = [base.photons, base.photons.div_ceil(10), base.photons.saturating_mul(10)];
+            counts
+                .map(|photons| with(&format!("{photons} photon paths"), &|config| config.photons = photons))
+                .into()
+        }
+        Some(Vary::Estimator) => vec![
+            with("sppm", &|config| config.estimator = Estimator::Sppm),
+            with("ppm", &|config| config.estimator = Estimator::Ppm),
+        ],
+        Some(Vary::Direct) => vec![
+            with("direct light", &|config| config.direct = Direct::Light),
+            with("direct photons", &|config| config.direct = Direct::Photons),
+        ],
+    }
+}
+
+/// Renders, prints the table, writes the files.
+pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
+    let outputs: Vec<&Path> = [&arguments.csv, &arguments.plot]
+        .into_iter()
+        .filter_map(|file| file.as_deref())
+        .collect();
+    for (index, file) in outputs.iter().enumerate() {
+        ensure!(!outputs[..index].contains(file), "{}: is named twice", file.display());
+        check_writable(file)?;
+    }
+    let reference = read_exr(&arguments.reference)?;
+    let scene = Scene::load(&arguments.scene)?;
+    for warning in &scene.warnings {
+        say!("warning: {warning}");
+    }
+    let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(&arguments.scene, what))?;
+    let side = |pixels: usize| u32::try_from(pixels).context("the reference is too large");
+    let base = RenderConfig {
+        resolution: [side(reference.width())?, side(reference.height())?],
+        photons: arguments.photons,
+        seed: arguments.seed,
+        ..RenderConfig::default()
+    };
+    let what = Converge {
+        scene: &packed,
+        camera: &scene.cameras[scene.camera_index(arguments.camera.as_deref())?],
+        device: arguments.device.as_deref(),
+        reference: &reference,
+        seconds: arguments.time.as_secs_f64(),
+        settings: settings(&base, arguments.vary),
+    };
+    let note = |what: &str| {
+        say!("converge: {what}");
+    };
+    let convergence = converge(&what, &note)?;
+    print(&converge_table(&convergence))?;
+    if let Some(file) = &arguments.csv {
+        write_whole(file, csv(&convergence).as_bytes())?;
+    }
+    if let Some(file) = &arguments.plot {
+        write_whole(file, plot_convergence(&convergence)?.as_bytes())?;
+    }
+    Ok(Outcome::Done)
+}
