@@ -34,7 +34,26 @@ struct Branch {
     vec3 emitted;
     uint depth;
     uint ignored;
+    bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
+    bool emission_seen;   // what the next surface emits
 };
+
+// The first surface on a ray's way.
+struct Glimpse {
+    vec3 emission;
+    bool dark; // nothing is there that scatters light
+};
+
+Glimpse glimpse(vec3 origin, vec3 direction, uint ignored) {
+    Hit hit = trace(origin, direction, 1e30, ignored, false);
+    if (loops_cut || hit.triangle == MISS) {
+        return Glimpse(vec3(0.0), true);
+    }
+    Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
+    Material material = material_at(surface.material);
+    bool dark = material.surface == MATTE && largest(material.base_color) == 0.0;
+    return Glimpse(emits(material, face(surface, direction).front) ? material.emission : vec3(0.0), dark);
+}
 
 void main() {
     uint pixel_slot = invocation_index();
@@ -59,6 +78,8 @@ void main() {
     branch.emitted = vec3(0.0);
     branch.depth = 0u;
     branch.ignored = MISS;
+    branch.reflection_seen = false;
+    branch.emission_seen = false;
 
     bool alive = inside;
     bool cut = false;
@@ -75,8 +96,9 @@ void main() {
             Material material = material_at(surface.material);
             Facing facing = face(surface, branch.direction);
             if (emits(material, facing.front)) {
-                branch.emitted += branch.throughput * material.emission;
+                branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * material.emission;
             }
+            branch.emission_seen = false;
             vec3 origin = surface.position;
             if (material.surface == MATTE) {
                 if (largest(material.base_color) > 0.0) {
@@ -112,6 +134,18 @@ void main() {
                         pending_count += 1u;
                         branch.throughput *= 1.0 - boundary.reflectance;
                         reflect_now = false;
+                    } else if (!branch.reflection_seen && boundary.reflectance < 1.0) {
+                        // A lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
+                        branch.reflection_seen = true;
+                        vec3 from = origin_towards(origin, facing.geometric_normal, boundary.reflected);
+                        Glimpse reflection = glimpse(from, boundary.reflected, hit.triangle);
+                        branch.emitted += branch.throughput * boundary.reflectance * reflection.emission;
+                        if (reflection.dark) {
+                            // That was all there is to the reflection.
+                            branch.throughput *= 1.0 - boundary.reflectance;
+                            reflect_now = false;
+                        }
+                        branch.emission_seen = reflect_now;
                     }
                     branch.direction = reflect_now ? boundary.reflected : boundary.refracted;
                     branch.throughput *= reflect_now ? vec3(1.0) : transmission;

@@ -23,6 +23,25 @@ struct Branch {
     emitted: DVec3,
     depth: u32,
     ignored: Option<u32>,
+    /// What a boundary that didn't split the path reflects of the lights' own radiance has been seen.
+    reflection_seen: bool,
+    /// What the next surface emits has been seen.
+    emission_seen: bool,
+}
+
+/// Radiance of the first surface on a ray's way, and whether nothing is there that scatters light.
+fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>) -> (DVec3, bool) {
+    let Some(hit) = nearest_hit(inputs, ray, FAR, ignored) else {
+        return (DVec3::ZERO, true);
+    };
+    let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+    let material = surface.material;
+    let dark = material.surface == MATTE && rgb(material.base_color).max_element() == 0.0;
+    if emits(material, Facing::new(&surface, ray.direction).front) {
+        (rgb(material.emission), dark)
+    } else {
+        (DVec3::ZERO, dark)
+    }
 }
 
 /// The visible points of an iteration, in slot order: as many for each pixel slot as
@@ -74,6 +93,8 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
         emitted: DVec3::ZERO,
         depth: 0,
         ignored: None,
+        reflection_seen: false,
+        emission_seen: false,
     }];
     let mut used = 0;
     while let Some(mut branch) = pending.pop() {
@@ -86,8 +107,14 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
             let facing = Facing::new(&surface, incoming);
             let base_color = rgb(surface.material.base_color);
             if emits(surface.material, facing.front) {
-                branch.emitted += branch.throughput * rgb(surface.material.emission);
+                let emission = rgb(surface.material.emission);
+                branch.emitted += if branch.emission_seen {
+                    DVec3::ZERO
+                } else {
+                    branch.throughput * emission
+                };
             }
+            branch.emission_seen = false;
             if surface.material.surface == MATTE {
                 if base_color.max_element() == 0.0 {
                     break nothing_seen(branch.emitted);
@@ -129,11 +156,30 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
                         branch.throughput *= (1.0 - boundary.reflectance) * transmission;
                         refracted
                     }
-                    Some(refracted) if choice >= boundary.reflectance => {
-                        branch.throughput *= transmission;
-                        refracted
+                    Some(refracted) => {
+                        let mut refracts = choice >= boundary.reflectance;
+                        if !branch.reflection_seen {
+                            branch.reflection_seen = true;
+                            let ray = Ray {
+                                origin: facing.origin_towards(surface.position, boundary.reflected),
+                                direction: boundary.reflected,
+                            };
+                            let (emission, dark) = glimpse(inputs, ray, Some(hit.triangle));
+                            branch.emitted += branch.throughput * boundary.reflectance * emission;
+                            if dark {
+                                branch.throughput *= 1.0 - boundary.reflectance;
+                                refracts = true;
+                            }
+                            branch.emission_seen = !refracts;
+                        }
+                        if refracts {
+                            branch.throughput *= transmission;
+                            refracted
+                        } else {
+                            boundary.reflected
+                        }
                     }
-                    _ => boundary.reflected,
+                    None => boundary.reflected,
                 }
             };
             branch.ray.origin = facing.origin_towards(surface.position, branch.ray.direction);
