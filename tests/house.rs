@@ -104,7 +104,7 @@ fn imports_go_downward() {
                 "crate::record",
             ],
         ),
-        ("pipeline.rs", &["crate::cli", "crate::cpu", "crate::bench"]),
+        ("pipeline", &["crate::cli", "crate::cpu", "crate::bench"]),
         ("bench", &["crate::cli"]),
     ];
     for (file, text) in code() {

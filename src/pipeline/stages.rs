@@ -1,0 +1,86 @@
+//! What an iteration runs, as data.
+
+use crate::config::{Accel, Direct, Estimator, RenderConfig, Sizes};
+use crate::gather::{METHODS, Record, default_method, scan};
+use crate::record::Recording;
+use crate::shaders;
+use crate::stage::{BufferId, Shader, StageDesc};
+
+/// The stages of a render, as data: what an iteration runs, without a device.
+#[derive(Clone, Copy)]
+pub struct Stages<'a> {
+    /// The render's settings.
+    pub config: &'a RenderConfig,
+    /// Its buffers' sizes.
+    pub sizes: &'a Sizes,
+}
+
+/// The stages of a gather method that [`super::Renderer::new`] has let pass.
+pub(super) fn method_stages(method: usize) -> (Record, Record) {
+    let nothing: Record = |_, _| ();
+    METHODS[method].stages().unwrap_or((nothing, nothing))
+}
+
+/// A recording whose stages report into a status of their own.
+pub(super) fn reporting() -> Recording {
+    let mut recording = Recording::new();
+    recording.fill(BufferId::Status, 0);
+    recording
+}
+
+impl Stages<'_> {
+    /// The commands of an iteration.
+    pub fn iteration(&self, iteration: u32) -> Recording {
+        let mut recording = reporting();
+        let (order, gather) = self.method();
+        if iteration == 0 || self.config.estimator == Estimator::Sppm {
+            self.camera(iteration, &mut recording);
+            order(self.sizes, &mut recording);
+        }
+        for batch in 0..self.sizes.batches(self.config.photons) {
+            self.photons(iteration, batch, &mut recording);
+            gather(self.sizes, &mut recording);
+        }
+        recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(iteration));
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.slots()));
+        recording
+    }
+
+    /// The commands that make the picture, after so many iterations and photon paths.
+    pub fn picture(&self, iterations: u32, emitted: u64) -> Recording {
+        let mut recording = reporting();
+        let push = [iterations, (emitted as f32).to_bits()];
+        recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
+        recording
+    }
+
+    /// What the gather method records for new visible points, and for a batch of photons.
+    pub(super) fn method(&self) -> (Record, Record) {
+        method_stages(self.config.gather.unwrap_or_else(default_method))
+    }
+
+    /// Finding the visible points.
+    pub(super) fn camera(&self, iteration: u32, recording: &mut Recording) {
+        recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(iteration));
+    }
+
+    /// Photon tracing of a batch, and moving its photons together.
+    pub(super) fn photons(&self, iteration: u32, batch: u32, recording: &mut Recording) {
+        let first = batch * self.sizes.batch_paths;
+        let paths = self.sizes.batch_paths.min(self.config.photons - first);
+        let lanes = self.sizes.photon_lanes;
+        recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([iteration, first, paths]));
+        scan(BufferId::LaneOffsets, lanes, recording);
+        recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.lane_photons()));
+    }
+
+    /// A stage that traces rays.
+    fn ray_stage(&self, shader: &'static Shader, threads: u32) -> StageDesc {
+        StageDesc::new(shader, threads).constants(vec![
+            ("BRUTE_FORCE", u32::from(self.config.accel == Accel::Brute)),
+            ("SLOTS", self.sizes.slots_per_pixel),
+            ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
+            ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),
+        ])
+    }
+}
