@@ -13,6 +13,7 @@ mod compare;
 mod converge;
 mod interrupt;
 mod list;
+mod outputs;
 mod progress;
 mod render;
 

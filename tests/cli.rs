@@ -1,20 +1,16 @@
 //! What scripts rely on: exit codes, one line for an error, files that are whole or absent.
 
+#[path = "program/mod.rs"]
+mod program;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use program::{ppm_vk, stderr};
 use tempfile::TempDir;
 
 fn scene(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
-}
-
-fn ppm_vk(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_ppm-vk"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("ppm-vk starts")
 }
 
 fn small_render(folder: &Path, scene: &Path, more: &[&str]) -> Output {
@@ -31,10 +27,6 @@ fn small_render(folder: &Path, scene: &Path, more: &[&str]) -> Output {
     ];
     arguments.extend(more);
     ppm_vk(folder, &arguments)
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn files(folder: &Path) -> Vec<String> {

@@ -1,21 +1,10 @@
-//! `ppm-vk bench` and `ppm-vk compare`, on small pictures.
+//! `ppm-vk bench`, `compare`, `converge` and --target-error, on small pictures.
 
-use std::path::Path;
-use std::process::{Command, Output};
+#[path = "program/mod.rs"]
+mod program;
 
+use program::{ppm_vk, stderr};
 use tempfile::TempDir;
-
-fn ppm_vk(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_ppm-vk"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("ppm-vk runs")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 #[test]
 fn the_gather_bench_prints_tables_and_writes_its_files() {
@@ -225,4 +214,26 @@ fn a_render_stops_at_the_target_error_and_writes_its_estimate() {
         let found = file.windows(name.len()).any(|bytes| bytes == name.as_bytes());
         assert!(found, "no {name} in the picture");
     }
+}
+
+#[test]
+fn no_measurement_overwrites_what_it_reads() {
+    let folder = TempDir::new().expect("folder");
+    let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/references/cornell.exr");
+    let copy = folder.path().join("r.exr");
+    std::fs::copy(reference, &copy).expect("a copy");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.gltf");
+    for arguments in [
+        vec!["compare", reference, "r.exr", "--heatmap", "r.exr"],
+        vec!["converge", "--scene", scene, "--reference", "r.exr", "--csv", "r.exr"],
+        vec!["bench", "gather", "--json", "f", "--plot", "f"],
+    ] {
+        let output = ppm_vk(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("would overwrite"), "{}", stderr(&output));
+    }
+    assert_eq!(
+        std::fs::read(&copy).expect("r.exr"),
+        std::fs::read(reference).expect("the reference")
+    );
 }

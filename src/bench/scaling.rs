@@ -7,7 +7,7 @@ use super::{log_slope, median};
 use crate::backend::{Backend, DeviceDescription};
 use crate::config::{Probe, RenderConfig};
 use crate::error::{Error, Result};
-use crate::gather::{METHODS, Runs, Tests};
+use crate::gather::METHODS;
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
 use crate::record::Run;
@@ -69,8 +69,8 @@ pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> R
         .radius
         .unwrap_or(f64::from(renderer.radius()) / bench.scene.scale);
     drop(renderer);
-    let near = |method: &&usize| matches!(METHODS[**method].runs, Runs::Device { tests: Tests::Near, .. });
-    let methods: Vec<usize> = bench.methods.iter().filter(near).copied().collect();
+    let near = |method: &usize| METHODS[*method].looks_nearby();
+    let methods: Vec<usize> = bench.methods.iter().copied().filter(near).collect();
     if methods.is_empty() {
         return Err(Error::Config(
             "--scaling: none of these --methods looks at nearby photons alone; try clustered or cluster-grid"

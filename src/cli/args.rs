@@ -98,7 +98,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub time: Option<Duration>,
     /// Stop when the estimated relative error (root of relMSE) is no larger than this, from iteration 16 on.
-    #[arg(long, value_name = "E", value_parser = error)]
+    #[arg(long, value_name = "E", value_parser = positive)]
     pub target_error: Option<f64>,
     /// Photon paths emitted in an iteration.
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
@@ -113,7 +113,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "A", default_value_t = 2.0 / 3.0, value_parser = alpha)]
     pub alpha: f32,
     /// Initial radius in scene units [default: from the photons' density, printed].
-    #[arg(long, value_name = "R", value_parser = radius)]
+    #[arg(long, value_name = "R", value_parser = positive)]
     pub radius: Option<f64>,
     /// How visible points find their photons (ppm-vk gathers lists the methods) [default: the fastest].
     #[arg(long, value_name = "METHOD", value_parser = gather_method)]
@@ -176,19 +176,10 @@ fn alpha(text: &str) -> Result<f32, String> {
     }
 }
 
-pub fn radius(text: &str) -> Result<f64, String> {
-    let radius = number(text)?;
-    if radius > 0.0 && radius.is_finite() {
-        Ok(radius)
-    } else {
-        Err("must be above 0".to_owned())
-    }
-}
-
-fn error(text: &str) -> Result<f64, String> {
-    let error = number(text)?;
-    if error > 0.0 && error.is_finite() {
-        Ok(error)
+pub fn positive(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
     } else {
         Err("must be above 0".to_owned())
     }

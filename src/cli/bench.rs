@@ -3,15 +3,16 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory};
 
-use super::args::{Arguments, gather_method, radius, resolution};
+use super::args::{Arguments, gather_method, positive, resolution};
+use super::outputs::check_outputs;
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
 use crate::config::{Probe, RenderConfig};
-use crate::film::{check_writable, write_png, write_whole};
+use crate::film::{write_png, write_whole};
 use crate::gather::{METHODS, method};
 use crate::scene::{PackedScene, Scene};
 
@@ -34,7 +35,7 @@ pub struct BenchGather {
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     photons: u32,
     /// Radius in scene units [default: from the photons' density].
-    #[arg(long, value_name = "R", value_parser = radius)]
+    #[arg(long, value_name = "R", value_parser = positive)]
     radius: Option<f64>,
     /// Methods, separated by commas [default: all; with --scaling those that look at nearby photons alone].
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = gather_method)]
@@ -72,11 +73,8 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
         Arguments::command().error(ErrorKind::ArgumentConflict, text).exit();
     }
     let outputs = [&arguments.json, &arguments.plot, &arguments.clusters];
-    let outputs: Vec<&Path> = outputs.into_iter().filter_map(|file| file.as_deref()).collect();
-    for (index, file) in outputs.iter().enumerate() {
-        ensure!(!outputs[..index].contains(file), "{}: is named twice", file.display());
-        check_writable(file)?;
-    }
+    let inputs: Vec<&Path> = arguments.scene.as_deref().into_iter().collect();
+    check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
     let scene = load(arguments.scene.as_deref())?;
     let packed = PackedScene::new(&scene).map_err(anyhow::Error::msg)?;
     let bench = GatherBench {

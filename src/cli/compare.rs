@@ -7,8 +7,9 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde_json::json;
 
+use super::outputs::check_outputs;
 use super::{Outcome, print};
-use crate::film::{Image, check_writable, read_exr, write_rgb8};
+use crate::film::{Image, read_exr, write_rgb8};
 use crate::metrics::{compare, defects, flip, relative_errors};
 
 /// `ppm-vk compare`.
@@ -28,9 +29,10 @@ pub struct Compare {
 
 /// Prints the measures, writes the heat map.
 pub fn run(arguments: &Compare) -> Result<Outcome> {
-    if let Some(file) = &arguments.heatmap {
-        check_writable(file)?;
-    }
+    check_outputs(
+        &[&arguments.image, &arguments.reference],
+        arguments.heatmap.as_deref().into_iter(),
+    )?;
     let (image, reference) = (read_exr(&arguments.image)?, read_exr(&arguments.reference)?);
     let measures = compare(&image, &reference).with_context(|| arguments.image.display().to_string())?;
     let bad = [

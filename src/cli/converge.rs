@@ -1,17 +1,18 @@
 //! Error against time.
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 
 use super::args::seconds;
+use super::outputs::check_outputs;
 use super::{Outcome, print};
 use crate::bench::{Converge, converge, converge_table, csv, plot_convergence};
 use crate::config::{Direct, Estimator, RenderConfig};
-use crate::film::{check_writable, read_exr, write_whole};
-use crate::gather::{METHODS, Runs, Tests};
+use crate::film::{read_exr, write_whole};
+use crate::gather::METHODS;
 use crate::scene::{PackedScene, Scene};
 
 /// `ppm-vk converge`.
@@ -84,7 +85,7 @@ fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfi
         Some(Vary::Gather) => METHODS
             .iter()
             .enumerate()
-            .filter(|(_, method)| matches!(method.runs, Runs::Device { tests: Tests::Near, .. }))
+            .filter(|(_, method)| method.looks_nearby())
             .map(|(index, method)| with(method.name, &|config| config.gather = Some(index)))
             .collect(),
         Some(Vary::Alpha) => [
@@ -114,14 +115,11 @@ fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfi
 
 /// Renders, prints the table, writes the files.
 pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
-    let outputs: Vec<&Path> = [&arguments.csv, &arguments.plot]
-        .into_iter()
-        .filter_map(|file| file.as_deref())
-        .collect();
-    for (index, file) in outputs.iter().enumerate() {
-        ensure!(!outputs[..index].contains(file), "{}: is named twice", file.display());
-        check_writable(file)?;
-    }
+    let outputs = [&arguments.csv, &arguments.plot];
+    check_outputs(
+        &[&arguments.scene, &arguments.reference],
+        outputs.into_iter().filter_map(|file| file.as_deref()),
+    )?;
     let reference = read_exr(&arguments.reference)?;
     let scene = Scene::load(&arguments.scene)?;
     for warning in &scene.warnings {

@@ -4,11 +4,12 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::args::{Arguments, BackendChoice, RenderArguments};
+use super::outputs::check_outputs;
 use super::progress::{Limits, Progress, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
@@ -34,11 +35,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let (backend_choice, gather) = choose_backend(arguments);
     let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
     // Before any work: nobody wants to learn after an hour that the picture can't be written.
-    let outputs: Vec<&Path> = outputs(arguments, &output).collect();
-    check_distinct(path, &outputs)?;
-    for file in outputs {
-        film::check_writable(file)?;
-    }
+    check_outputs(&[path], outputs(arguments, &output))?;
     interrupt::install()?;
 
     let scene = Scene::load(path)?;
@@ -203,26 +200,6 @@ fn default_output(scene: &Path) -> PathBuf {
     let mut name = scene.file_stem().unwrap_or(scene.as_os_str()).to_owned();
     name.push(".exr");
     PathBuf::from(name)
-}
-
-/// Fails if two outputs, or an output and the scene, are one file.
-fn check_distinct(scene: &Path, outputs: &[&Path]) -> Result<()> {
-    let place = |path: &Path| {
-        path.canonicalize()
-            .or_else(|_| std::path::absolute(path))
-            .unwrap_or(path.to_owned())
-    };
-    let mut taken = vec![place(scene)];
-    for output in outputs {
-        let file = place(output);
-        ensure!(
-            !taken.contains(&file),
-            "{}: would overwrite the scene or another output; name another",
-            output.display()
-        );
-        taken.push(file);
-    }
-    Ok(())
 }
 
 fn outputs<'a>(arguments: &'a RenderArguments, output: &'a Path) -> impl Iterator<Item = &'a Path> {

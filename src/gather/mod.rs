@@ -54,6 +54,11 @@ pub enum Tests {
 }
 
 impl GatherMethod {
+    /// Whether it runs on a device and tests nearby photons alone.
+    pub fn looks_nearby(&self) -> bool {
+        matches!(self.runs, Runs::Device { tests: Tests::Near, .. })
+    }
+
     /// The stages that it runs; `None` if it runs on the CPU.
     pub fn stages(&self) -> Option<(Record, Record)> {
         match self.runs {
