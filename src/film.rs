@@ -32,6 +32,15 @@ impl Image {
         Self { width, height, pixels }
     }
 
+    /// A picture of a renderer's film: RGBA, in rows from the top left; alpha is left out.
+    ///
+    /// # Panics
+    /// As [`Image::new`].
+    pub fn from_film([width, height]: [u32; 2], film: &[[f32; 4]]) -> Self {
+        let pixels = film.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+        Self::new(width as usize, height as usize, pixels)
+    }
+
     /// Width in pixels.
     pub fn width(&self) -> usize {
         self.width

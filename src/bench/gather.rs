@@ -113,11 +113,6 @@ impl MethodResult {
     pub fn build_and_gather_us(&self) -> f64 {
         self.build_us + self.gather_us
     }
-
-    /// With ordering new visible points: what each iteration of the stochastic estimator costs.
-    pub fn total_us(&self) -> f64 {
-        self.order_us + self.build_and_gather_us()
-    }
 }
 
 /// Visible points, photons and what each point accepts of them.

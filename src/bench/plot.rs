@@ -4,7 +4,7 @@ use plotters::prelude::*;
 
 use super::converge::Convergence;
 use super::gather::Results;
-use super::scaling::{Point, Scaling};
+use super::scaling::Scaling;
 use crate::error::{Error, Result};
 
 const COLORS: [RGBColor; 6] = [
@@ -115,6 +115,51 @@ fn label(logarithm: f64) -> String {
     }
 }
 
+/// A name, and points.
+type Line = (String, Vec<(f64, f64)>);
+
+/// Draws lines on logarithmic scales, with a legend.
+fn draw_lines(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    caption: &str,
+    legend: SeriesLabelPosition,
+    lines: &[Line],
+) -> Result<()> {
+    let points = || lines.iter().flat_map(|(_, points)| points);
+    let mut chart = ChartBuilder::on(area)
+        .caption(caption, ("sans-serif", 15))
+        .margin(10)
+        .x_label_area_size(30)
+        .y_label_area_size(60)
+        .build_cartesian_2d(
+            log_range(points().map(|point| point.0)),
+            log_range(points().map(|point| point.1)),
+        )
+        .map_err(drawing)?;
+    chart
+        .configure_mesh()
+        .x_label_formatter(&|x| label(*x))
+        .y_label_formatter(&|y| label(*y))
+        .draw()
+        .map_err(drawing)?;
+    for (index, (name, points)) in lines.iter().enumerate() {
+        let color = COLORS[index % COLORS.len()];
+        let logarithms = points.iter().map(|(x, y)| (x.log10(), y.log10()));
+        chart
+            .draw_series(LineSeries::new(logarithms, color.stroke_width(2)).point_size(3))
+            .map_err(drawing)?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+    }
+    chart
+        .configure_series_labels()
+        .position(legend)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK)
+        .draw()
+        .map_err(drawing)
+}
+
 /// Cost against each quantity, in a panel each, on logarithmic scales.
 ///
 /// # Errors
@@ -127,46 +172,22 @@ pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
     {
         let area = SVGBackend::with_string(&mut svg, (1200, 420)).into_drawing_area();
         area.fill(&WHITE).map_err(drawing)?;
-        for (panel, against) in area.split_evenly((1, quantities.len().max(1))).iter().zip(&quantities) {
-            let lines: Vec<_> = scaling
-                .series
-                .iter()
-                .filter(|series| series.against == *against)
+        let panels = area.split_evenly((1, quantities.len().max(1)));
+        for (panel, against) in panels.iter().zip(&quantities) {
+            let series = scaling.series.iter().filter(|series| series.against == *against);
+            let lines: Vec<Line> = series
+                .map(|series| {
+                    let points = series.points.iter().map(|point| (point.x, point.cost_us * 1e-3));
+                    let name = format!("{}, slope {:.2}", series.method, series.slope);
+                    (name, points.collect())
+                })
                 .collect();
-            let points = || lines.iter().flat_map(|series| &series.points);
-            let mut chart = ChartBuilder::on(panel)
-                .caption(format!("ms against {against}"), ("sans-serif", 15))
-                .margin(10)
-                .x_label_area_size(30)
-                .y_label_area_size(50)
-                .build_cartesian_2d(
-                    log_range(points().map(|point| point.x)),
-                    log_range(points().map(|point| point.cost_us * 1e-3)),
-                )
-                .map_err(drawing)?;
-            chart
-                .configure_mesh()
-                .x_label_formatter(&|x| label(*x))
-                .y_label_formatter(&|y| label(*y))
-                .draw()
-                .map_err(drawing)?;
-            for (index, series) in lines.iter().enumerate() {
-                let color = COLORS[index % COLORS.len()];
-                let logarithms = |point: &Point| (point.x.log10(), (point.cost_us * 1e-3).log10());
-                let points: Vec<(f64, f64)> = series.points.iter().map(logarithms).collect();
-                chart
-                    .draw_series(LineSeries::new(points, color.stroke_width(2)).point_size(3))
-                    .map_err(drawing)?
-                    .label(format!("{}, slope {:.2}", series.method, series.slope))
-                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
-            }
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperLeft)
-                .background_style(WHITE.mix(0.8))
-                .border_style(BLACK)
-                .draw()
-                .map_err(drawing)?;
+            draw_lines(
+                panel,
+                &format!("ms against {against}"),
+                SeriesLabelPosition::UpperLeft,
+                &lines,
+            )?;
         }
         area.present().map_err(drawing)?;
     }
@@ -178,49 +199,19 @@ pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
 /// # Errors
 /// A drawing that fails.
 pub fn plot_convergence(convergence: &Convergence) -> Result<String> {
-    let points = || convergence.curves.iter().flat_map(|curve| &curve.points);
+    let curves = convergence.curves.iter();
+    let lines: Vec<Line> = curves
+        .map(|curve| {
+            let points = curve.points.iter().map(|point| (point.device_s, point.rel_mse));
+            (format!("{}, slope {:.2}", curve.setting, curve.slope), points.collect())
+        })
+        .collect();
+    let caption = format!("relMSE against seconds: {}", convergence.device.name);
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, (800, 560)).into_drawing_area();
         area.fill(&WHITE).map_err(drawing)?;
-        let mut chart = ChartBuilder::on(&area)
-            .caption(
-                format!("relMSE against seconds: {}", convergence.device.name),
-                ("sans-serif", 16),
-            )
-            .margin(10)
-            .x_label_area_size(30)
-            .y_label_area_size(60)
-            .build_cartesian_2d(
-                log_range(points().map(|point| point.device_s)),
-                log_range(points().map(|point| point.rel_mse)),
-            )
-            .map_err(drawing)?;
-        chart
-            .configure_mesh()
-            .x_label_formatter(&|x| label(*x))
-            .y_label_formatter(&|y| label(*y))
-            .draw()
-            .map_err(drawing)?;
-        for (index, curve) in convergence.curves.iter().enumerate() {
-            let color = COLORS[index % COLORS.len()];
-            let line = curve
-                .points
-                .iter()
-                .map(|point| (point.device_s.log10(), point.rel_mse.log10()));
-            chart
-                .draw_series(LineSeries::new(line, color.stroke_width(2)).point_size(3))
-                .map_err(drawing)?
-                .label(format!("{}, slope {:.2}", curve.setting, curve.slope))
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::LowerLeft)
-            .background_style(WHITE.mix(0.8))
-            .border_style(BLACK)
-            .draw()
-            .map_err(drawing)?;
+        draw_lines(&area, &caption, SeriesLabelPosition::LowerLeft, &lines)?;
         area.present().map_err(drawing)?;
     }
     Ok(svg)

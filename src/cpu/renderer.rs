@@ -186,12 +186,7 @@ impl Backend for Renderer {
     fn resolve(&mut self) -> Result<Image> {
         let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
         let film = resolve(&self.settings, &self.statistics, &self.direct_sums, iterations, emitted);
-        let [width, height] = self.config.resolution.map(|side| side as usize);
-        Ok(Image::new(
-            width,
-            height,
-            film.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
-        ))
+        Ok(Image::from_film(self.config.resolution, &film))
     }
 
     fn iterations(&self) -> u32 {

@@ -217,10 +217,8 @@ impl Renderer {
         let recording = self.stages().picture(self.iterations.max(1), self.emitted.max(1));
         let run = self.run(&recording)?;
         self.counters.non_finite += u64::from(self.status()?.non_finite);
-        let [width, height] = self.config.resolution.map(|side| side as usize);
-        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(width * height))?;
-        let pixels = film.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
-        Ok((run, Image::new(width, height, pixels)))
+        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
+        Ok((run, Image::from_film(self.config.resolution, &film)))
     }
 
     /// Gathers the photons at hand with any method of a device; what was gathered before is forgotten. Returns what it
@@ -296,6 +294,8 @@ impl Renderer {
         self.run_until_it_fits(|stages| {
             let mut recording = reporting();
             stages.camera(0, &mut recording);
+            let (order, _) = stages.method();
+            order(stages.sizes, &mut recording);
             stages.photons(radius::PILOT, 0, &mut recording);
             recording
         })?;
@@ -311,8 +311,7 @@ impl Renderer {
         for _ in 0..radius::FITS {
             self.run_until_it_fits(|stages| {
                 let mut recording = reporting();
-                let (order, gather) = stages.method();
-                order(stages.sizes, &mut recording);
+                let (_, gather) = stages.method();
                 gather(stages.sizes, &mut recording);
                 recording
             })?;
