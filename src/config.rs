@@ -31,6 +31,15 @@ pub enum Accel {
     Brute,
 }
 
+/// How a ray is tested against a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum TriangleTest {
+    /// From the triangle's corners: no ray passes between triangles that share an edge or a corner (Woop and others).
+    Watertight,
+    /// From precomputed planes, as in the paper (Havel and Herout): some rays pass between neighbours.
+    Havel,
+}
+
 /// A render's settings.
 #[derive(Debug, Clone)]
 pub struct RenderConfig {
@@ -53,6 +62,8 @@ pub struct RenderConfig {
     pub cell_photons: Option<u32>,
     /// How rays meet triangles.
     pub accel: Accel,
+    /// How a ray is tested against a triangle.
+    pub triangle_test: TriangleTest,
     /// Bounces of a path at the most.
     pub max_depth: u32,
     /// Seed of all random numbers.
@@ -71,6 +82,7 @@ impl Default for RenderConfig {
             gather: None,
             cell_photons: None,
             accel: Accel::Bvh,
+            triangle_test: TriangleTest::Watertight,
             max_depth: 64,
             seed: 0,
         }

@@ -8,6 +8,9 @@ pub const NO_OBJECT: u32 = u32::MAX;
 /// Light of a triangle that doesn't emit.
 pub const NO_LIGHT: u32 = u32::MAX;
 
+/// Bit of a reference to a [`BvhRecord`]: it is a triangle of a leaf.
+pub const LEAF: u32 = 1 << 31;
+
 /// Bit of [`StatusCounters::again`]: a lane's photons or a batch's didn't fit.
 pub const PHOTONS_DID_NOT_FIT: u32 = 1;
 /// Bit of [`StatusCounters::again`]: a lane's paths need more loop iterations than the driver gives.
@@ -84,16 +87,17 @@ device_structs! {
         pub bsdf_sampling: f32,
     }
 
-    /// An inner node of the BVH with the boxes of both children.
-    pub struct BvhNode: 64 {
-        /// xyz: corner; w: u32 bits, the child's node, or its first triangle.
-        pub left_min: [f32; 4],
-        /// xyz: corner; w: u32 bits, triangles of a leaf, 0 for an inner node.
-        pub left_max: [f32; 4],
-        /// As `left_min`.
-        pub right_min: [f32; 4],
-        /// As `left_max`.
-        pub right_max: [f32; 4],
+    /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf. Records refer to each
+    /// other by index; a reference with [`LEAF`] set is to the first triangle of a leaf, whose others follow it.
+    pub struct BvhRecord: 64 {
+        /// Node: corner of the left box; w: u32 bits, the left reference. Triangle: its first corner.
+        pub row0: [f32; 4],
+        /// Node: the left box's other corner. Triangle: its second corner.
+        pub row1: [f32; 4],
+        /// Node: corner of the right box; w: u32 bits, the right reference. Triangle: its third corner.
+        pub row2: [f32; 4],
+        /// Node: the right box's other corner. Triangle: x: u32 bits, its index; y: u32 bits, 1 for a leaf's last.
+        pub row3: [f32; 4],
     }
 
     /// Havel and Herout's precomputed triangle.

@@ -10,7 +10,7 @@ use std::borrow::Cow;
 pub enum BufferId {
     /// [`crate::layout::Settings`].
     Settings,
-    /// [`crate::layout::BvhNode`]s, the root first.
+    /// [`crate::layout::BvhRecord`]s, the root first.
     Bvh,
     /// [`crate::layout::HavelTriangle`]s in the order of the BVH's leaves.
     HavelTriangles,

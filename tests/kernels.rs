@@ -19,6 +19,8 @@ mod photons;
 mod pictures;
 #[path = "kernels/primitives.rs"]
 mod primitives;
+#[path = "kernels/rays.rs"]
+mod rays;
 #[path = "kernels/statistics.rs"]
 mod statistics;
 #[path = "kernels/visible_points.rs"]

@@ -1,6 +1,7 @@
 // Rays against triangles. Include after scene.glsl.
 
 layout(constant_id = 0) const bool BRUTE_FORCE = false;
+layout(constant_id = 4) const bool HAVEL = false; // the paper's triangle test instead of the watertight one
 
 // Loop iterations that this invocation has made. Some drivers end every loop of an invocation, without a word, once it
 // has made 65,535 of them: the stages stop before and count what they cut short.
@@ -11,18 +12,85 @@ bool loops_left() {
     return loop_count < settings.loop_limit;
 }
 
+// A ray and coordinates in which it is an axis: `across` and `up` vanish along it, `along` is t.
+struct Ray {
+    vec3 origin;
+    vec3 direction;
+    vec3 across;
+    vec3 up;
+    vec3 along;
+};
+
+Ray ray_frame(vec3 origin, vec3 direction) {
+    vec3 size = abs(direction);
+    Ray ray;
+    ray.origin = origin;
+    ray.direction = direction;
+    // Sheared along the axis that the ray is nearest to.
+    if (size.x >= size.y && size.x >= size.z) {
+        float inverse = 1.0 / direction.x;
+        ray.across = vec3(-direction.y * inverse, 1.0, 0.0);
+        ray.up = vec3(-direction.z * inverse, 0.0, 1.0);
+        ray.along = vec3(inverse, 0.0, 0.0);
+    } else if (size.y >= size.z) {
+        float inverse = 1.0 / direction.y;
+        ray.across = vec3(1.0, -direction.x * inverse, 0.0);
+        ray.up = vec3(0.0, -direction.z * inverse, 1.0);
+        ray.along = vec3(0.0, inverse, 0.0);
+    } else {
+        float inverse = 1.0 / direction.z;
+        ray.across = vec3(1.0, 0.0, -direction.x * inverse);
+        ray.up = vec3(0.0, 1.0, -direction.y * inverse);
+        ray.along = vec3(0.0, 0.0, inverse);
+    }
+    return ray;
+}
+
+// A corner in the ray's coordinates: a function of the corner alone, the same for all triangles that share it.
+vec3 in_frame(Ray ray, vec3 corner) {
+    precise vec3 from = corner - ray.origin;
+    precise vec3 result = vec3(dot(ray.across, from), dot(ray.up, from), dot(ray.along, from));
+    return result;
+}
+
+// On which side of the edge from a to b the ray passes. Rounding is monotonous, so that the sign is right or the value 0,
+// and the edge's other triangle finds the same with the opposite sign.
+float side_of(vec2 a, vec2 b) {
+    precise float result = a.x * b.y - a.y * b.x;
+    return result;
+}
+
+// Woop, Benthin and Wald, «Watertight Ray/Triangle Intersection», JCGT 2(1), 2013: no ray passes between triangles that
+// share an edge or a corner. Accepts 0 < t < hit.t.
+bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, uint index, inout Hit hit) {
+    vec3 a = in_frame(ray, corner0);
+    vec3 b = in_frame(ray, corner1);
+    vec3 c = in_frame(ray, corner2);
+    vec3 sides = vec3(side_of(b.xy, c.xy), side_of(c.xy, a.xy), side_of(a.xy, b.xy));
+    if (any(lessThan(sides, vec3(0.0))) && any(greaterThan(sides, vec3(0.0)))) {
+        return false;
+    }
+    float inverse = 1.0 / (sides.x + sides.y + sides.z);
+    float t = dot(sides, vec3(a.z, b.z, c.z)) * inverse;
+    if (!(t > 0.0 && t < hit.t)) {
+        return false;
+    }
+    hit = Hit(t, sides.y * inverse, sides.z * inverse, index);
+    return true;
+}
+
 // Havel and Herout, «Yet faster ray-triangle intersection (using SSE4)», 2010: the test with precomputed planes.
 // Accepts 0 < t < hit.t.
-bool intersect_triangle(uint index, vec3 origin, vec3 direction, inout Hit hit) {
+bool intersect_havel(Ray ray, uint index, inout Hit hit) {
     HavelTriangle triangle = havel_triangle(index);
-    float det = dot(direction, triangle.n0.xyz);
-    float det_t = triangle.n0.w - dot(origin, triangle.n0.xyz);
+    float det = dot(ray.direction, triangle.n0.xyz);
+    float det_t = triangle.n0.w - dot(ray.origin, triangle.n0.xyz);
     float inverse = 1.0 / det;
     float t = det_t * inverse;
     if (!(t > 0.0 && t < hit.t)) {
         return false;
     }
-    vec3 point = origin + t * direction;
+    vec3 point = ray.origin + t * ray.direction;
     float u = dot(point, triangle.n1.xyz) + triangle.n1.w;
     float v = dot(point, triangle.n2.xyz) + triangle.n2.w;
     if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0)) {
@@ -32,86 +100,91 @@ bool intersect_triangle(uint index, vec3 origin, vec3 direction, inout Hit hit) 
     return true;
 }
 
+bool intersect_triangle(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, uint index, inout Hit hit) {
+    return HAVEL ? intersect_havel(ray, index, hit)
+                 : intersect_watertight(ray, corner0, corner1, corner2, index, hit);
+}
+
 // Entry distance of the ray into a box, or a value above `limit` where it misses.
-float enter_box(vec3 box_min, vec3 box_max, vec3 inverse_direction, vec3 scaled_origin, float limit) {
-    vec3 t0 = box_min * inverse_direction - scaled_origin;
-    vec3 t1 = box_max * inverse_direction - scaled_origin;
+float enter_box(vec3 box_min, vec3 box_max, vec3 origin, vec3 inverse_direction, float limit) {
+    vec3 t0 = (box_min - origin) * inverse_direction;
+    vec3 t1 = (box_max - origin) * inverse_direction;
     vec3 near = min(t0, t1);
     vec3 far = max(t0, t1);
     float enter = max(max(near.x, near.y), max(near.z, 0.0));
     // The factor covers the rounding of the slab test: Ize, «Robust BVH Ray Traversal», JCGT 2(2), 2013.
-    float leave = min(min(far.x, far.y), min(far.z, limit)) * 1.00000036;
+    float leave = min(min(far.x, far.y), min(far.z, limit)) * 1.00000048;
     return enter <= leave ? enter : 1e30;
 }
 
 const uint STACK_SIZE = 64u;
+const uint LEAF = 0x80000000u; // of a reference to a triangle, see layout::BvhRecord
 
 // The nearest triangle but `ignored` before t = limit. With any_hit: some triangle before it.
 Hit trace(vec3 origin, vec3 direction, float limit, uint ignored, bool any_hit) {
+    Ray ray = ray_frame(origin, direction);
     Hit hit = Hit(limit, 0.0, 0.0, MISS);
     if (BRUTE_FORCE) {
         uint i = 0u;
-        while (i < settings.triangle_count && loops_left()) {
+        bool over = false;
+        while (i < settings.triangle_count && !over && loops_left()) {
             loop_count += 1u;
-            if (i != ignored && intersect_triangle(i, origin, direction, hit) && any_hit) {
-                return hit;
-            }
+            ShadingTriangle triangle = shading_triangle(i);
+            over = i != ignored &&
+                   intersect_triangle(ray, triangle.p0.xyz, triangle.p1.xyz, triangle.p2.xyz, i, hit) && any_hit;
             i += 1u;
         }
-        loops_cut = loops_cut || i < settings.triangle_count;
+        loops_cut = loops_cut || (i < settings.triangle_count && !over);
         return hit;
     }
     // A component of 0 gives infinite slabs; ±1e-20 keeps 0 · ∞ out of them.
     vec3 safe = vec3(abs(direction.x) < 1e-20 ? 1e-20 : direction.x, abs(direction.y) < 1e-20 ? 1e-20 : direction.y,
                      abs(direction.z) < 1e-20 ? 1e-20 : direction.z);
     vec3 inverse_direction = 1.0 / safe;
-    vec3 scaled_origin = origin * inverse_direction;
     uint stack[STACK_SIZE];
     uint depth = 0u;
-    uint node_index = 0u;
+    uint limit_of_loops = settings.loop_limit; // kept at hand: some drivers load it anew in each step
+    uint reference = 0u;
     bool complete = false;
-    while (loops_left()) {
+    // A step takes a node or a triangle, whichever the lane is at: no lane of a subgroup waits for another's leaf.
+    do {
         loop_count += 1u;
-        BvhNode node = bvh_node(node_index);
-        float enter_left = enter_box(node.left_min.xyz, node.left_max.xyz, inverse_direction, scaled_origin, hit.t);
-        float enter_right = enter_box(node.right_min.xyz, node.right_max.xyz, inverse_direction, scaled_origin, hit.t);
-        uint left = floatBitsToUint(node.left_min.w);
-        uint right = floatBitsToUint(node.right_min.w);
-        uint left_count = floatBitsToUint(node.left_max.w);
-        uint right_count = floatBitsToUint(node.right_max.w);
-        bool go_left = enter_left < 1e30;
-        bool go_right = enter_right < 1e30;
-        // Leaves are tested at once, so that only inner nodes reach the stack.
-        for (uint i = left; go_left && i < left + left_count; i++) {
-            loop_count += 1u;
-            if (i != ignored && intersect_triangle(i, origin, direction, hit) && any_hit) {
+        bool is_leaf = (reference & LEAF) != 0u;
+        uint record = reference & ~LEAF;
+        vec4 row0 = TEXEL(Bvh, 4u * record);
+        vec4 row1 = TEXEL(Bvh, 4u * record + 1u);
+        vec4 row2 = TEXEL(Bvh, 4u * record + 2u);
+        vec4 row3 = TEXEL(Bvh, 4u * record + 3u);
+        uint far_child = 0u;
+        bool push = false;
+        bool pop;
+        if (is_leaf) {
+            uint index = floatBitsToUint(row3.x);
+            if (index != ignored && intersect_triangle(ray, row0.xyz, row1.xyz, row2.xyz, index, hit) && any_hit) {
                 return hit;
             }
-        }
-        for (uint i = right; go_right && i < right + right_count; i++) {
-            loop_count += 1u;
-            if (i != ignored && intersect_triangle(i, origin, direction, hit) && any_hit) {
-                return hit;
-            }
-        }
-        go_left = go_left && left_count == 0u && enter_left <= hit.t;
-        go_right = go_right && right_count == 0u && enter_right <= hit.t;
-        if (go_left && go_right) {
-            bool left_first = enter_left <= enter_right;
-            stack[depth] = left_first ? right : left;
-            depth += 1u;
-            node_index = left_first ? left : right;
-        } else if (go_left || go_right) {
-            node_index = go_left ? left : right;
+            pop = floatBitsToUint(row3.y) == 1u;
+            reference += 1u;
         } else {
-            if (depth == 0u) {
-                complete = true;
-                break;
-            }
-            depth -= 1u;
-            node_index = stack[depth];
+            float enter_left = enter_box(row0.xyz, row1.xyz, origin, inverse_direction, hit.t);
+            float enter_right = enter_box(row2.xyz, row3.xyz, origin, inverse_direction, hit.t);
+            uint left = floatBitsToUint(row0.w);
+            uint right = floatBitsToUint(row2.w);
+            bool left_first = enter_left <= enter_right;
+            reference = left_first ? left : right;
+            far_child = left_first ? right : left;
+            push = max(enter_left, enter_right) < 1e30;
+            pop = min(enter_left, enter_right) >= 1e30;
         }
-    }
+        // Written whether it counts or not: stores under a condition are far dearer on drivers that carry lanes in SIMD.
+        stack[depth] = far_child;
+        depth += push ? 1u : 0u;
+        if (pop) {
+            complete = depth == 0u;
+            depth = max(depth, 1u) - 1u;
+            reference = stack[depth];
+        }
+    } while (!complete && loop_count < limit_of_loops);
     loops_cut = loops_cut || !complete;
     return hit;
 }

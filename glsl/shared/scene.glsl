@@ -8,13 +8,6 @@ const uint MATTE = 0u;
 const uint MIRROR = 1u;
 const uint DIELECTRIC = 2u;
 
-struct BvhNode {
-    vec4 left_min;  // w: uint bits, first child's index, or the leaf's first triangle
-    vec4 left_max;  // w: uint bits, the leaf's triangle count; 0 for an inner node
-    vec4 right_min;
-    vec4 right_max;
-};
-
 // Havel and Herout's precomputed triangle.
 struct HavelTriangle {
     vec4 n0; // xyz: normal, w: its plane's offset
@@ -48,10 +41,6 @@ uniform usamplerBuffer Bvh;
 uniform usamplerBuffer HavelTriangles;
 uniform usamplerBuffer ShadingTriangles;
 uniform usamplerBuffer Materials;
-
-BvhNode bvh_node(uint i) {
-    return BvhNode(TEXEL(Bvh, 4u * i), TEXEL(Bvh, 4u * i + 1u), TEXEL(Bvh, 4u * i + 2u), TEXEL(Bvh, 4u * i + 3u));
-}
 
 HavelTriangle havel_triangle(uint i) {
     return HavelTriangle(TEXEL(HavelTriangles, 3u * i), TEXEL(HavelTriangles, 3u * i + 1u),

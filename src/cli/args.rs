@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::bench::BenchGather;
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
-use crate::config::{Accel, Direct, Estimator};
+use crate::config::{Accel, Direct, Estimator, TriangleTest};
 use crate::gather;
 
 /// Progressive photon mapping on Vulkan: a glTF scene in, an OpenEXR picture out.
@@ -125,6 +125,9 @@ pub struct RenderArguments {
     /// How rays meet triangles.
     #[arg(long, value_enum, default_value_t = Accel::Bvh)]
     pub accel: Accel,
+    /// How a ray is tested against a triangle: havel is the paper's test with precomputed planes.
+    #[arg(long, value_enum, default_value_t = TriangleTest::Watertight)]
+    pub triangle_test: TriangleTest,
     /// Bounces of a camera or photon path at the most.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: u32,

@@ -190,6 +190,7 @@ fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> Render
         gather: Some(gather),
         cell_photons: arguments.cell_photons,
         accel: arguments.accel,
+        triangle_test: arguments.triangle_test,
         max_depth: arguments.max_depth,
         seed: arguments.seed,
     }

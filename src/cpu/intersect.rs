@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::Inputs;
 use super::vector::{word, xyz};
 use crate::config::Accel;
-use crate::layout::{BvhNode, ShadingTriangle};
+use crate::layout::{BvhRecord, LEAF, ShadingTriangle};
 
 /// The points `origin + t · direction` with t > 0.
 #[derive(Debug, Clone, Copy)]
@@ -97,27 +97,23 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn traverse(&mut self, nodes: &[BvhNode]) {
+    fn traverse(&mut self, records: &[BvhRecord]) {
         // A component of 0 gives infinite slabs; ±1e-20 keeps 0 · ∞ out of them.
         let safe = |d: f64| if d.abs() < 1e-20 { 1e-20 } else { d };
         let inverse = self.ray.direction.map(safe).recip();
         let mut stack = Vec::with_capacity(64);
-        stack.push(Child {
-            index: 0,
-            count: 0,
-            enter: 0.0,
-        });
-        while let Some(child) = stack.pop() {
-            if child.enter > self.limit || self.is_over() {
+        stack.push((0, 0.0));
+        while let Some((reference, enter)) = stack.pop() {
+            if enter > self.limit || self.is_over() {
                 continue;
             }
-            if child.count > 0 {
-                self.test(child.index..child.index + child.count);
+            if reference & LEAF != 0 {
+                self.test(leaf(records, reference));
                 continue;
             }
-            let [left, right] = children(&nodes[child.index as usize], self.ray.origin, inverse, self.limit);
-            let left_first = match (&left, &right) {
-                (Some(left), Some(right)) => left.enter <= right.enter,
+            let [left, right] = children(&records[reference as usize], self.ray.origin, inverse, self.limit);
+            let left_first = match (left, right) {
+                (Some((_, left)), Some((_, right))) => left <= right,
                 _ => true,
             };
             let (first, second) = if left_first { (left, right) } else { (right, left) };
@@ -127,28 +123,22 @@ impl<'a> Search<'a> {
     }
 }
 
-/// A child of a BVH node whose box the ray enters.
-struct Child {
-    /// Its node, or the first triangle of a leaf.
-    index: u32,
-    /// Triangles of a leaf, 0 for an inner node.
-    count: u32,
-    /// t at the entry.
-    enter: f64,
+/// The triangles of a leaf.
+fn leaf(records: &[BvhRecord], reference: u32) -> Range<u32> {
+    let triangles = &records[(reference & !LEAF) as usize..];
+    let first = triangles[0].row3[0].to_bits();
+    let others = triangles.iter().position(|triangle| triangle.row3[1].to_bits() == 1);
+    first..first + 1 + others.unwrap_or(0) as u32
 }
 
-/// The children that the ray enters before `limit`. All that is known here of a node's layout is in this function.
-fn children(node: &BvhNode, origin: DVec3, inverse: DVec3, limit: f64) -> [Option<Child>; 2] {
-    [(node.left_min, node.left_max), (node.right_min, node.right_max)].map(|(min, max)| {
+/// The references to those children of a node whose boxes the ray enters before `limit`, and t at the entry.
+fn children(node: &BvhRecord, origin: DVec3, inverse: DVec3, limit: f64) -> [Option<(u32, f64)>; 2] {
+    [(node.row0, node.row1), (node.row2, node.row3)].map(|(min, max)| {
         let (t0, t1) = ((xyz(min) - origin) * inverse, (xyz(max) - origin) * inverse);
         let enter = t0.min(t1).max_element().max(0.0);
         // The factor covers the rounding of the slab test: Ize, «Robust BVH Ray Traversal», JCGT 2(2), 2013.
         let leave = t0.max(t1).min_element().min(limit) * (1.0 + 4.0 * f64::EPSILON);
-        (enter <= leave).then_some(Child {
-            index: word(min),
-            count: word(max),
-            enter,
-        })
+        (enter <= leave).then_some((word(min), enter))
     })
 }
 

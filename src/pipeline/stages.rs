@@ -1,6 +1,6 @@
 //! What an iteration runs, as data.
 
-use crate::config::{Accel, Direct, Estimator, RenderConfig, Sizes};
+use crate::config::{Accel, Direct, Estimator, RenderConfig, Sizes, TriangleTest};
 use crate::gather::{METHODS, Record, default_method, scan};
 use crate::record::Recording;
 use crate::shaders;
@@ -78,6 +78,7 @@ impl Stages<'_> {
     fn ray_stage(&self, shader: &'static Shader, threads: u32) -> StageDesc {
         StageDesc::new(shader, threads).constants(vec![
             ("BRUTE_FORCE", u32::from(self.config.accel == Accel::Brute)),
+            ("HAVEL", u32::from(self.config.triangle_test == TriangleTest::Havel)),
             ("SLOTS", self.sizes.slots_per_pixel),
             ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
             ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),

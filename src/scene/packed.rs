@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::object_grid::object_grids;
 use super::{Scene, Surface, bvh};
-use crate::layout::{BvhNode, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, ShadingTriangle};
+use crate::layout::{BvhRecord, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, ShadingTriangle};
 
 /// A dielectric's [`Material::surface`].
 const DIELECTRIC: u32 = 2;
@@ -13,8 +13,8 @@ const DIELECTRIC: u32 = 2;
 #[derive(Debug, Clone)]
 pub struct PackedScene {
     /// Hierarchy, the root first.
-    pub bvh: Vec<BvhNode>,
-    /// Triangles for intersection.
+    pub bvh: Vec<BvhRecord>,
+    /// Triangles for the paper's intersection test.
     pub havel_triangles: Vec<HavelTriangle>,
     /// The same triangles for shading.
     pub shading_triangles: Vec<ShadingTriangle>,
@@ -67,7 +67,7 @@ impl PackedScene {
             materials: scene.materials.iter().map(material).collect(),
             lights,
             light_flux,
-            bvh: bvh.nodes,
+            bvh: bvh.records,
             order: bvh.order,
             scale: scene.normalisation.scale,
         })

@@ -1,0 +1,27 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Traces given rays, for tests: what they meet is their hit.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "texel.glsl"
+#include "scene.glsl"
+#include "intersect.glsl"
+
+layout(push_constant) uniform Push {
+    uint count;
+} push;
+
+layout(std430) readonly buffer ProbeFrom { vec4 rays[]; };  // origin, direction; w: unused
+layout(std430) writeonly buffer ProbeTo { vec4 hits[]; };   // t, u, v, uint bits of the triangle or MISS
+
+void main() {
+    uint i = invocation_index();
+    if (i < push.count) {
+        Hit hit = trace(rays[2u * i].xyz, rays[2u * i + 1u].xyz, 1e30, MISS, false);
+        hits[i] = vec4(hit.t, hit.u, hit.v, uintBitsToFloat(loops_cut ? MISS : hit.triangle));
+    }
+}

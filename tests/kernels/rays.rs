@@ -1,0 +1,209 @@
+//! Rays against triangles on the device: where rounding decides, nothing may pass between two triangles.
+
+use glam::Vec3;
+use ppm_vk::config::{RenderConfig, TriangleTest};
+use ppm_vk::gpu::Device;
+use ppm_vk::pipeline::Renderer;
+use ppm_vk::record::Recording;
+use ppm_vk::scene::{PackedScene, Scene, Triangle};
+use ppm_vk::shaders;
+use ppm_vk::stage::{BufferId, StageDesc};
+
+use super::bench::{random_numbers, scene};
+
+/// A ray as the probe reads it: origin, then direction.
+type Ray = [[f32; 4]; 2];
+
+/// Rays traced at once.
+const BATCH: usize = 1 << 17;
+
+fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    [origin, direction].map(|v| [v.x, v.y, v.z, 0.0])
+}
+
+/// What rays meet of a closed surface that they start in.
+struct Probe {
+    renderer: Renderer,
+    triangle_test: TriangleTest,
+}
+
+impl Probe {
+    fn new(scene: &Scene, triangle_test: TriangleTest) -> Self {
+        let packed = PackedScene::new(scene).expect("a hierarchy");
+        let config = RenderConfig {
+            resolution: [8, 8],
+            photons: 64,
+            radius: Some(0.1),
+            triangle_test,
+            ..RenderConfig::default()
+        };
+        let device = Device::open(None).expect("a Vulkan device");
+        let renderer = Renderer::new(device, &packed, &scene.cameras[0], config).expect("a renderer");
+        Self {
+            renderer,
+            triangle_test,
+        }
+    }
+
+    /// How many of the rays meet nothing, and one of them.
+    fn leaks(&mut self, rays: impl Iterator<Item = Ray>) -> (usize, usize, Option<Ray>) {
+        let (mut traced, mut leaked, mut first) = (0, 0, None);
+        let mut rays = rays.peekable();
+        while rays.peek().is_some() {
+            let batch: Vec<Ray> = rays.by_ref().take(BATCH).collect();
+            self.renderer.gpu().upload(BufferId::ProbeFrom, &batch).expect("rays");
+            let gpu = self.renderer.gpu();
+            gpu.create(BufferId::ProbeTo, (16 * batch.len()) as u64).expect("hits");
+            let mut recording = Recording::new();
+            let constants = vec![("HAVEL", u32::from(self.triangle_test == TriangleTest::Havel))];
+            recording.dispatch(
+                StageDesc::new(&shaders::RAY_PROBE, batch.len() as u32)
+                    .constants(constants)
+                    .push(batch.len() as u32),
+            );
+            gpu.run(&recording).expect("a run");
+            let hits: Vec<[f32; 4]> = gpu.download(BufferId::ProbeTo, Some(batch.len())).expect("hits");
+            for (ray, hit) in batch.iter().zip(&hits) {
+                traced += 1;
+                let missed = hit[3].to_bits() == u32::MAX;
+                assert!(missed || (hit[0] > 0.0 && hit[0].is_finite()), "{ray:?} meets {hit:?}");
+                if missed {
+                    leaked += 1;
+                    first.get_or_insert(*ray);
+                }
+            }
+        }
+        (traced, leaked, first)
+    }
+}
+
+/// Both tests on the same rays: none may pass with the watertight one; what passes with Havel's is counted.
+fn assert_tight(what: &str, scene: &Scene, rays: impl Fn() -> Box<dyn Iterator<Item = Ray>>) {
+    let (traced, leaked, first) = Probe::new(scene, TriangleTest::Watertight).leaks(rays());
+    let (_, by_havel, _) = Probe::new(scene, TriangleTest::Havel).leaks(rays());
+    println!("{what}: of {traced} rays {leaked} leave with the watertight test, {by_havel} with Havel's");
+    assert_eq!(leaked, 0, "{what}: of {traced} rays that leave, one is {first:?}");
+}
+
+/// A scene whose only object is this, in render space as it is.
+fn closed(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Scene {
+    let mut scene = scene("furnace-closed");
+    scene.normals = positions.iter().map(|position| position.normalize()).collect();
+    scene.positions = positions;
+    scene.triangles = triangles
+        .into_iter()
+        .map(|vertices| Triangle { vertices, object: 0 })
+        .collect();
+    scene
+}
+
+/// A bipyramid: `angles` around its axis, seen from inside everywhere closed.
+fn bipyramid(angles: &[f64]) -> Scene {
+    let rim = angles.iter().map(|a| Vec3::new(a.cos() as f32, 0.013, a.sin() as f32));
+    let positions: Vec<Vec3> = [Vec3::Y, Vec3::NEG_Y].into_iter().chain(rim).collect();
+    let count = angles.len() as u32;
+    let triangles = (0..count).flat_map(|i| {
+        let (a, b) = (2 + i, 2 + (i + 1) % count);
+        [[0, a, b], [1, b, a]]
+    });
+    closed(positions, triangles.collect())
+}
+
+fn evenly(count: u32) -> Vec<f64> {
+    (0..count)
+        .map(|i| std::f64::consts::TAU * f64::from(i) / f64::from(count))
+        .collect()
+}
+
+/// A thousand of them with an aspect of 10⁶ among wide ones.
+fn slivers() -> Scene {
+    let mut angles: Vec<f64> = (0..1000).map(|i| 1e-6 * f64::from(i)).collect();
+    angles.extend(evenly(16).into_iter().skip(1));
+    bipyramid(&angles)
+}
+
+/// Rays from near the middle to points of edges, every eighth to a corner itself.
+fn rays_at_edges(scene: &Scene, count: u32) -> Box<dyn Iterator<Item = Ray>> {
+    let edges: Vec<[Vec3; 2]> = scene
+        .triangles
+        .iter()
+        .flat_map(|t| [0, 1, 2].map(|i| [i, (i + 1) % 3].map(|i| scene.positions[t.vertices[i] as usize])))
+        .collect();
+    let numbers = random_numbers(2 * count).collect::<Vec<_>>();
+    Box::new((0..count as usize).map(move |i| {
+        let [x, y, z, along] = numbers[2 * i];
+        let [edge, corner, ..] = numbers[2 * i + 1];
+        let origin = (Vec3::new(x, y, z) - 0.5) * 0.2;
+        let [a, b] = edges[(edge * edges.len() as f32) as usize];
+        let target = if corner < 0.125 { a } else { a.lerp(b, along) };
+        ray(origin, target - origin)
+    }))
+}
+
+fn long() -> bool {
+    std::env::var_os("PPM_VK_LONG").is_some()
+}
+
+#[test]
+fn no_ray_passes_a_shared_edge_or_corner() {
+    let count = if long() { 10_000_000 } else { 300_000 };
+    let scene = bipyramid(&evenly(97));
+    assert_tight("edges and corners of a bipyramid", &scene, || {
+        rays_at_edges(&scene, count)
+    });
+}
+
+#[test]
+fn no_ray_passes_between_slivers() {
+    let scene = slivers();
+    let count = if long() { 10_000_000 } else { 300_000 };
+    assert_tight("slivers of aspect 10⁶", &scene, || rays_at_edges(&scene, count));
+}
+
+#[test]
+fn no_ray_along_an_axis_passes() {
+    let scene = bipyramid(&evenly(96));
+    let corners = scene.positions.clone();
+    assert_tight("rays along axes", &scene, || {
+        // From the plane through the middle: they meet corners and edges of the rim, and both tips, exactly.
+        let axes = corners.clone().into_iter().flat_map(|corner| {
+            let axes: &[usize] = if corner.y.abs() == 1.0 { &[1] } else { &[0, 2] };
+            axes.iter().map(move |&axis| (corner, axis))
+        });
+        let inside = axes.filter(|(corner, axis)| corner[*axis].abs() > 0.1);
+        Box::new(inside.map(|(corner, axis)| {
+            let (mut origin, mut direction) = (corner, Vec3::ZERO);
+            origin[axis] = 0.0;
+            direction[axis] = corner[axis].signum();
+            ray(origin, direction)
+        }))
+    });
+}
+
+#[test]
+fn no_grazing_ray_passes() {
+    // From a little above a wall of the room along it: the cosine to the wall's normal is 10⁻⁷ and less.
+    let room = scene("furnace-closed");
+    let (low, high) = room
+        .positions
+        .iter()
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| {
+            (low.min(*p), high.max(*p))
+        });
+    let numbers: Vec<[f32; 4]> = random_numbers(200_000).collect();
+    assert_tight("grazing rays", &room, || {
+        let numbers = numbers.clone();
+        Box::new(numbers.into_iter().enumerate().map(move |(i, [x, y, angle, tilt])| {
+            let axis = i % 3;
+            let mut origin =
+                low.lerp(high, 0.5) + (high - low) * 0.49 * Vec3::new(2.0 * x - 1.0, 2.0 * y - 1.0, 2.0 * x - 1.0);
+            origin[axis] = low[axis] + (high - low)[axis] * 1e-6;
+            let (sin, cos) = (std::f32::consts::TAU * angle).sin_cos();
+            let mut direction = Vec3::ZERO;
+            direction[(axis + 1) % 3] = sin;
+            direction[(axis + 2) % 3] = cos;
+            direction[axis] = (tilt - 0.5) * 2e-7;
+            ray(origin, direction)
+        }))
+    });
+}
