@@ -40,6 +40,27 @@ pub enum TriangleTest {
     Havel,
 }
 
+/// Where the numbers of paths come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Sampler {
+    /// Scrambled Sobol' sequences: samples that spread evenly, over an iteration's photons and over a pixel's iterations.
+    Sobol = 0,
+    /// Independent numbers, from a hash.
+    Independent = 1,
+    /// A congruential generator for each path, as in the paper. Neighbouring paths are correlated: for comparison alone.
+    Congruential = 2,
+}
+
+impl Sampler {
+    /// What an estimator uses where the user doesn't say: the paper's has independent numbers.
+    pub fn of(estimator: Estimator) -> Self {
+        match estimator {
+            Estimator::Sppm => Self::Sobol,
+            Estimator::Ppm => Self::Independent,
+        }
+    }
+}
+
 /// A render's settings.
 #[derive(Debug, Clone)]
 pub struct RenderConfig {
@@ -66,6 +87,8 @@ pub struct RenderConfig {
     pub triangle_test: TriangleTest,
     /// Bounces of a path at the most.
     pub max_depth: u32,
+    /// Where the numbers of paths come from.
+    pub sampler: Sampler,
     /// Seed of all random numbers.
     pub seed: u32,
 }
@@ -84,6 +107,7 @@ impl Default for RenderConfig {
             accel: Accel::Bvh,
             triangle_test: TriangleTest::Watertight,
             max_depth: 64,
+            sampler: Sampler::Sobol,
             seed: 0,
         }
     }
@@ -129,6 +153,21 @@ impl RenderConfig {
             return Err(Error::Config("--max-depth 0: at least one bounce is needed".to_owned()));
         }
         Ok(())
+    }
+
+    /// First of the iterations whose numbers are one sequence of low discrepancy with those of `iteration`. Blocks grow
+    /// with the render, to a fourth of it and less, and are independent of each other: their spread is what the error is
+    /// estimated from ([`crate::estimate`], whose batches are whole blocks).
+    pub fn block_of(&self, iteration: u32) -> u32 {
+        let grown = 1 << (iteration.max(4).ilog2() - 2);
+        // A sequence has 2³² points.
+        let most = 1 << (u32::MAX / self.photons.max(1)).max(1).ilog2();
+        iteration / grown.min(most) * grown.min(most)
+    }
+
+    /// Photon paths of the block before `iteration`.
+    pub fn first_of_block(&self, iteration: u32) -> u32 {
+        (iteration - self.block_of(iteration)).wrapping_mul(self.photons)
     }
 }
 

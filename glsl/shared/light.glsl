@@ -13,19 +13,31 @@ Light light_at(uint i) {
     return Light(bits.x, uintBitsToFloat(bits.y), uintBitsToFloat(bits.z), uintBitsToFloat(bits.w));
 }
 
+// A light, and the part of [0, 1) that chooses it.
+struct Choice {
+    uint light;
+    float before;
+    float width;
+};
+
 // The light at u in [0, 1), by bisection of the cumulative probabilities.
-uint choose_light(float u) {
+Choice choose_light(float u) {
     uint low = 0u;
     uint high = settings.light_count - 1u;
+    float before = 0.0;
+    float end = 1.0;
     while (low < high) {
         uint middle = (low + high) / 2u;
-        if (u < light_at(middle).cumulative) {
+        float cumulative = light_at(middle).cumulative;
+        if (u < cumulative) {
             high = middle;
+            end = cumulative;
         } else {
             low = middle + 1u;
+            before = cumulative;
         }
     }
-    return low;
+    return Choice(low, before, end - before);
 }
 
 bool emits(Material material, bool front) {

@@ -16,20 +16,43 @@ uvec4 pcg4d(uvec4 v) {
     return v;
 }
 
+// Where numbers come from, see config::Sampler.
+layout(constant_id = 5) const uint SAMPLER = 0u;
+const uint SOBOL = 0u;
+const uint INDEPENDENT = 1u;
+const uint CONGRUENTIAL = 2u;
+
+#include "sobol.glsl"
+
 // What a path draws its numbers from.
 struct Random {
     uint path;      // pixel, or photon path within its iteration
     uint iteration;
     uint seed;      // the user's, mixed with the kind of path
     uint dimension; // how many quadruples have been drawn
+    uint sequence;  // of low discrepancy: a pixel's own, or that of all photons
+    uint block;     // first of the iterations whose numbers are one sequence
+    uint index;     // in that sequence
+    uint state;     // of the congruential generator
 };
 
 const uint CAMERA_PATH = 0x63616d65u;
 const uint PHOTON_PATH = 0x70686f74u;
 const uint LIGHT_SAMPLE = 0x6c696768u;
 
-Random random_for(uint kind, uint path, uint iteration, uint seed) {
-    return Random(path, iteration, seed ^ kind, 0u);
+Random random_for(uint kind, uint path, uint iteration, uint block, uint sequence, uint index, uint seed) {
+    uint mixed = seed ^ kind;
+    return Random(path, iteration, mixed, 0u, sequence, block, index, mixed + iteration * 0x9e3779b1u + path);
+}
+
+// For a pixel, or something else that has one path an iteration.
+Random random_of_pixel(uint kind, uint pixel, uint iteration, uint block, uint seed) {
+    return random_for(kind, pixel, iteration, block, pixel, iteration - block, seed);
+}
+
+// For a photon path of an iteration that begins at `first` in its sequence.
+Random random_of_photon(uint path, uint iteration, uint block, uint first, uint seed) {
+    return random_for(PHOTON_PATH, path, iteration, block, 0u, first + path, seed);
 }
 
 // Uniform in [0, 1): the 24 bits that an f32 in that range can hold.
@@ -37,9 +60,27 @@ vec4 unit_floats(uvec4 bits) {
     return vec4(bits >> 8u) * (1.0 / 16777216.0);
 }
 
+// The paper's «classic congruential generator», with the constants of Press and others, «Numerical Recipes», 1992. Its
+// neighbouring streams are correlated: for comparison alone.
+uint congruential(inout uint state) {
+    state = state * 1664525u + 1013904223u;
+    return state;
+}
+
 // The next four numbers, uniform in [0, 1).
 vec4 next4(inout Random random) {
-    uvec4 bits = pcg4d(uvec4(random.path, random.iteration, random.seed, random.dimension));
+    uvec4 bits;
+    if (SAMPLER == SOBOL) {
+        uvec4 seed = pcg4d(uvec4(random.sequence, random.block, ~random.seed, random.dimension));
+        bits = sobol_point(random.index, seed);
+    } else if (SAMPLER == INDEPENDENT) {
+        bits = pcg4d(uvec4(random.path, random.iteration, random.seed, random.dimension));
+    } else {
+        bits.x = congruential(random.state);
+        bits.y = congruential(random.state);
+        bits.z = congruential(random.state);
+        bits.w = congruential(random.state);
+    }
     random.dimension += 1u;
     return unit_floats(bits);
 }

@@ -23,6 +23,7 @@ layout(constant_id = 2) const bool JITTER = true;
 
 layout(push_constant) uniform Push {
     uint iteration;
+    uint block; // see config::RenderConfig::block_of
 } push;
 
 layout(std430) writeonly buffer VisiblePoints { VisiblePoint visible_points[]; };
@@ -63,7 +64,8 @@ void main() {
     uvec2 pixel = pixel_of(pixel_slot);
     bool inside = all(lessThan(pixel, settings.resolution));
 
-    Random random = random_for(CAMERA_PATH, pixel.y * settings.resolution.x + pixel.x, push.iteration, settings.seed);
+    Random random = random_of_pixel(CAMERA_PATH, pixel.y * settings.resolution.x + pixel.x, push.iteration, push.block,
+                                    settings.seed);
     vec4 u = next4(random);
     vec2 film = (vec2(pixel) + (JITTER ? u.xy : vec2(0.5))) / vec2(settings.resolution) * 2.0 - 1.0;
 

@@ -23,6 +23,7 @@ layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
 
 layout(push_constant) uniform Push {
     uint iteration;
+    uint block; // see config::RenderConfig::block_of
 } push;
 
 uniform usamplerBuffer VisiblePoints;
@@ -32,7 +33,7 @@ layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 // (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
 // variance next to a light.
 vec3 sample_direct(VisiblePoint visible_point, uint slot) {
-    Random random = random_for(LIGHT_SAMPLE, slot, push.iteration, settings.seed);
+    Random random = random_of_pixel(LIGHT_SAMPLE, slot, push.iteration, push.block, settings.seed);
     vec4 u = next4(random);
     bool by_bsdf = u.w < settings.bsdf_sampling;
 
@@ -44,7 +45,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     uint ignored = MISS;
     Surface emitter;
     if (!by_bsdf) {
-        Light light = light_at(choose_light(u.x));
+        Light light = light_at(choose_light(u.x).light);
         emitter = surface_at(light.triangle, triangle_point(u.yz));
         bool front = dot(position - emitter.position, emitter.geometric_normal) > 0.0;
         // Both ends move off their surfaces.

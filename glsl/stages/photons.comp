@@ -22,7 +22,9 @@ layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
 
 layout(push_constant) uniform Push {
     uint iteration;
-    uint first_path; // of this batch
+    uint block;          // see config::RenderConfig::block_of
+    uint first_of_block; // paths of the block before this iteration
+    uint first_path;     // of this batch
     uint path_count;
 } push;
 
@@ -40,17 +42,21 @@ struct Path {
 };
 
 Path emit(inout Random random) {
+    // Place and direction are one point of four dimensions: what is left of the number that chose the light, with digits
+    // of another below it, is the first.
     vec4 u = next4(random);
     vec4 w = next4(random);
-    Light light = light_at(choose_light(u.x));
-    Surface emitter = surface_at(light.triangle, triangle_point(u.yz));
+    Choice choice = choose_light(u.x);
+    float rest = clamp((u.x - choice.before + w.x * (1.0 / 16777216.0)) / choice.width, 0.0, 1.0);
+    Light light = light_at(choice.light);
+    Surface emitter = surface_at(light.triangle, triangle_point(vec2(rest, u.y)));
     Material material = material_at(emitter.material);
     vec3 normal = emitter.geometric_normal;
-    if (material.double_sided != 0u && w.z < 0.5) {
+    if (material.double_sided != 0u && w.y < 0.5) {
         normal = -normal;
     }
     Path path;
-    path.direction = cosine_direction(normal, w.xy);
+    path.direction = cosine_direction(normal, u.zw);
     path.origin = offset_origin(emitter.position, normal);
     // Lights are chosen in proportion to their mean flux, which cancels their area.
     vec3 emission = material.emission;
@@ -91,7 +97,8 @@ void main() {
                 finished = true;
                 break;
             }
-            random = random_for(PHOTON_PATH, push.first_path + next, push.iteration, settings.seed);
+            random = random_of_photon(push.first_path + next, push.iteration, push.block, push.first_of_block,
+                                      settings.seed);
             path = emit(random);
             next += settings.photon_lanes;
             alive = true;

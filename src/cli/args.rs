@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::bench::BenchGather;
+use super::bench::{BenchGather, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
-use crate::config::{Accel, Direct, Estimator, TriangleTest};
+use crate::config::{Accel, Direct, Estimator, Sampler, TriangleTest};
 use crate::gather;
 
 /// Progressive photon mapping on Vulkan: a glTF scene in, an OpenEXR picture out.
@@ -59,6 +59,8 @@ pub enum Command {
 pub enum Bench {
     /// The gather methods on one device: the paper's tables with its figures beside, then all methods.
     Gather(Box<BenchGather>),
+    /// How random the numbers are that paths draw: χ² of tuples. Exits with 1 if independent ones aren't.
+    Random(BenchRandom),
 }
 
 /// What computes.
@@ -131,6 +133,9 @@ pub struct RenderArguments {
     /// Bounces of a camera or photon path at the most.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: u32,
+    /// Where the numbers of paths come from [default: sobol, with --estimator ppm independent].
+    #[arg(long, value_enum)]
+    pub sampler: Option<Sampler>,
     /// Seed: the same one on the same device gives the same picture, bit for bit (but for the paper's gathers that order
     /// photons by atomic counters).
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory};
 
@@ -123,6 +123,36 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
     if let Some(file) = &arguments.clusters {
         write_clusters(&bench, file)?;
     }
+    Ok(Outcome::Done)
+}
+
+/// `ppm-vk bench random`.
+#[derive(Debug, Args)]
+pub struct BenchRandom {
+    /// Numbers that each test draws.
+    #[arg(long, value_name = "N", default_value_t = 1_000_000_000, value_parser = clap::value_parser!(u64).range(1..))]
+    numbers: u64,
+    /// Seed of the numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u32,
+    /// As JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Tests the generators, prints the table.
+pub fn random(arguments: &BenchRandom) -> Result<Outcome> {
+    let battery = bench::battery(arguments.numbers, arguments.seed, &|what| {
+        say!("bench: {what}");
+    });
+    if arguments.json {
+        print(&(serde_json::to_string_pretty(&battery)? + "\n"))?;
+    } else {
+        print(&bench::battery_table(&battery))?;
+    }
+    let independent = battery.tests.iter().filter(|test| test.sampler == "independent");
+    let failed = independent.filter(|test| !test.passes).count();
+    ensure!(failed == 0, "{failed} tests of independent numbers failed");
     Ok(Outcome::Done)
 }
 

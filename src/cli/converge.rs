@@ -10,7 +10,7 @@ use super::args::seconds;
 use super::outputs::check_outputs;
 use super::{Outcome, print};
 use crate::bench::{Converge, converge, converge_table, csv, plot_convergence};
-use crate::config::{Direct, Estimator, RenderConfig};
+use crate::config::{Direct, Estimator, RenderConfig, Sampler};
 use crate::film::{read_exr, write_whole};
 use crate::gather::METHODS;
 use crate::scene::{PackedScene, Scene};
@@ -65,6 +65,8 @@ enum Vary {
     Estimator,
     /// Direct light by sampling the lights, and by photons.
     Direct,
+    /// Every source of random numbers.
+    Sampler,
 }
 
 fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfig)> {
@@ -79,6 +81,7 @@ fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfi
             with("defaults", &|_| ()),
             with("paper", &|config| {
                 config.estimator = Estimator::Ppm;
+                config.sampler = Sampler::of(Estimator::Ppm);
                 config.direct = Direct::Photons;
             }),
         ],
@@ -104,7 +107,15 @@ fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfi
         }
         Some(Vary::Estimator) => vec![
             with("sppm", &|config| config.estimator = Estimator::Sppm),
-            with("ppm", &|config| config.estimator = Estimator::Ppm),
+            with("ppm", &|config| {
+                config.estimator = Estimator::Ppm;
+                config.sampler = Sampler::of(Estimator::Ppm);
+            }),
+        ],
+        Some(Vary::Sampler) => vec![
+            with("sobol", &|config| config.sampler = Sampler::Sobol),
+            with("independent", &|config| config.sampler = Sampler::Independent),
+            with("congruential", &|config| config.sampler = Sampler::Congruential),
         ],
         Some(Vary::Direct) => vec![
             with("direct light", &|config| config.direct = Direct::Light),

@@ -13,7 +13,7 @@ use super::outputs::check_outputs;
 use super::progress::{Limits, Progress, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
-use crate::config::RenderConfig;
+use crate::config::{RenderConfig, Sampler};
 use crate::estimate::ErrorEstimate;
 use crate::film::{self, Metadata};
 use crate::gather::{self, METHODS, Runs};
@@ -192,6 +192,7 @@ fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> Render
         accel: arguments.accel,
         triangle_test: arguments.triangle_test,
         max_depth: arguments.max_depth,
+        sampler: arguments.sampler.unwrap_or(Sampler::of(arguments.estimator)),
         seed: arguments.seed,
     }
 }

@@ -72,7 +72,7 @@ fn nothing_seen(emitted: DVec3) -> VisiblePoint {
 fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [VisiblePoint], counts: &Counts) {
     let settings = inputs.settings;
     let [width, _] = settings.resolution;
-    let mut random = Random::new(PathKind::Camera, pixel[1] * width + pixel[0], iteration, settings.seed);
+    let mut random = Random::of_pixel(inputs, PathKind::Camera, pixel[1] * width + pixel[0], iteration);
     let [jitter_x, jitter_y, ..] = random.next4();
     let [x, y] = match inputs.config.estimator {
         Estimator::Sppm => [jitter_x, jitter_y],

@@ -28,7 +28,7 @@ pub fn direct(
     slots.for_each(|(slot, (sum, point))| {
         let mut radiance = xyz(point.emitted_normal);
         if inputs.config.direct == Direct::Light && word(point.position_object) != NO_OBJECT {
-            let mut random = Random::new(PathKind::LightSample, slot as u32, iteration, inputs.settings.seed);
+            let mut random = Random::of_pixel(inputs, PathKind::LightSample, slot as u32, iteration);
             radiance += sample_direct(inputs, point, random.next4());
         }
         if radiance.is_finite() {
@@ -56,7 +56,7 @@ fn sample_direct(inputs: &Inputs<'_>, point: &VisiblePoint, [choice, u, v, way]:
             .flatten();
         hit.map(|hit| surface_at(inputs.scene, hit.triangle, hit.u, hit.v))
     } else {
-        let light = choose_light(&inputs.scene.lights, choice);
+        let light = choose_light(&inputs.scene.lights, choice).light;
         let (u, v) = triangle_point(u, v);
         let emitter = surface_at(inputs.scene, light.triangle, u, v);
         let front = (position - emitter.position).dot(emitter.geometric_normal) > 0.0;

@@ -20,6 +20,7 @@ mod random;
 mod renderer;
 mod resolve;
 mod sampling;
+mod sobol;
 mod surface;
 mod tiles;
 mod update;

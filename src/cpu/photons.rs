@@ -4,8 +4,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::intersect::{Ray, nearest_hit};
-use super::light::choose_light;
-use super::random::{PathKind, Random};
+use super::light::{Choice, choose_light};
+use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction, triangle_point};
 use super::surface::{Boundary, Facing, MATTE, MIRROR, offset_origin, surface_at};
 use super::vector::{rgb, with_word};
@@ -53,10 +53,12 @@ struct Path {
 
 /// Starts a path on a light chosen in proportion to its flux.
 fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Path {
-    let [choice, u, v, _] = random.next4();
-    let [direction_u, direction_v, side, _] = random.next4();
-    let light = choose_light(&inputs.scene.lights, choice);
-    let (u, v) = triangle_point(u, v);
+    let [choice, v, direction_u, direction_v] = random.next4();
+    let [digits, side, ..] = random.next4();
+    let Choice { light, before, width } = choose_light(&inputs.scene.lights, choice);
+    // What is left of the number that chose the light, with digits of another below it.
+    let rest = ((choice - before + digits / f64::from(1 << 24)) / width).clamp(0.0, 1.0);
+    let (u, v) = triangle_point(rest, v);
     let emitter = surface_at(inputs.scene, light.triangle, u, v);
     let back = emitter.material.double_sided != 0 && side < 0.5;
     let normal = if back {
@@ -88,7 +90,7 @@ fn roulette(arriving: DVec3, scattered: DVec3, u: f64) -> Option<DVec3> {
 fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Photon>, counts: &Counts) {
     let settings = inputs.settings;
     let samples_lights = inputs.config.direct == Direct::Light;
-    let mut random = Random::new(PathKind::Photon, path, iteration, settings.seed);
+    let mut random = Random::of_photon(inputs, path, iteration);
     let mut path = emit(inputs, &mut random);
     for _ in 0..settings.max_depth {
         let Some(hit) = nearest_hit(inputs, path.ray, FAR, path.ignored) else {

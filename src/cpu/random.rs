@@ -1,5 +1,8 @@
 //! The numbers that `glsl/shared/random.glsl` draws, bit for bit.
 
+use super::{Inputs, sobol};
+use crate::config::Sampler;
+
 /// What kind of path draws: mixed into the seed, so that kinds don't draw the same numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PathKind {
@@ -14,26 +17,86 @@ pub enum PathKind {
 /// The numbers of one path in one iteration.
 #[derive(Debug, Clone, Copy)]
 pub struct Random {
+    sampler: Sampler,
     path: u32,
     iteration: u32,
+    /// The user's, mixed with the kind of path.
     seed: u32,
+    /// How many quadruples have been drawn.
     dimension: u32,
+    /// Of low discrepancy: a pixel's own, or that of all photons.
+    sequence: u32,
+    /// First of the iterations whose numbers are one sequence.
+    block: u32,
+    /// In that sequence.
+    index: u32,
+    /// Of the congruential generator.
+    state: u32,
 }
 
 impl Random {
-    /// The path's numbers from the first one on.
+    /// The numbers from the first one on of a path with independent numbers.
     pub fn new(kind: PathKind, path: u32, iteration: u32, seed: u32) -> Self {
+        Self::with(Sampler::Independent, kind, path, iteration, seed)
+    }
+
+    /// Those of another generator; of Sobol' sequences the first point.
+    pub fn with(sampler: Sampler, kind: PathKind, path: u32, iteration: u32, seed: u32) -> Self {
+        let seed = seed ^ kind as u32;
         Self {
+            sampler,
             path,
             iteration,
-            seed: seed ^ kind as u32,
+            seed,
             dimension: 0,
+            sequence: 0,
+            block: 0,
+            index: 0,
+            state: seed
+                .wrapping_add(iteration.wrapping_mul(0x9e37_79b1))
+                .wrapping_add(path),
+        }
+    }
+
+    /// Those of a pixel, or of something else that has one path an iteration.
+    pub fn of_pixel(inputs: &Inputs<'_>, kind: PathKind, pixel: u32, iteration: u32) -> Self {
+        let block = inputs.config.block_of(iteration);
+        Self {
+            sequence: pixel,
+            block,
+            index: iteration - block,
+            ..Self::with(inputs.config.sampler, kind, pixel, iteration, inputs.settings.seed)
+        }
+    }
+
+    /// Those of a photon path; `path` counts those of the iteration.
+    pub fn of_photon(inputs: &Inputs<'_>, path: u32, iteration: u32) -> Self {
+        Self {
+            block: inputs.config.block_of(iteration),
+            index: inputs.config.first_of_block(iteration).wrapping_add(path),
+            ..Self::with(
+                inputs.config.sampler,
+                PathKind::Photon,
+                path,
+                iteration,
+                inputs.settings.seed,
+            )
         }
     }
 
     /// The next four numbers, uniform in [0, 1): multiples of 2⁻²⁴, so that an f32 holds each of them.
     pub fn next4(&mut self) -> [f64; 4] {
-        let bits = pcg4d([self.path, self.iteration, self.seed, self.dimension]);
+        let bits = match self.sampler {
+            Sampler::Sobol => {
+                let seed = pcg4d([self.sequence, self.block, !self.seed, self.dimension]);
+                sobol::point(self.index, seed)
+            }
+            Sampler::Independent => pcg4d([self.path, self.iteration, self.seed, self.dimension]),
+            Sampler::Congruential => [(); 4].map(|()| {
+                self.state = self.state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                self.state
+            }),
+        };
         self.dimension = self.dimension.wrapping_add(1);
         bits.map(|word| f64::from(word >> 8) / f64::from(1 << 24))
     }

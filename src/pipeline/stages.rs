@@ -41,7 +41,8 @@ impl Stages<'_> {
             self.photons(iteration, batch, &mut recording);
             gather(self.sizes, &mut recording);
         }
-        recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(iteration));
+        let turn = [iteration, self.config.block_of(iteration)];
+        recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(turn));
         recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.slots()));
         recording
     }
@@ -61,7 +62,8 @@ impl Stages<'_> {
 
     /// Finding the visible points.
     pub(super) fn camera(&self, iteration: u32, recording: &mut Recording) {
-        recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(iteration));
+        let turn = [iteration, self.config.block_of(iteration)];
+        recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(turn));
     }
 
     /// Photon tracing of a batch, and moving its photons together.
@@ -69,7 +71,14 @@ impl Stages<'_> {
         let first = batch * self.sizes.batch_paths;
         let paths = self.sizes.batch_paths.min(self.config.photons - first);
         let lanes = self.sizes.photon_lanes;
-        recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([iteration, first, paths]));
+        let block = self.config.block_of(iteration);
+        recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([
+            iteration,
+            block,
+            self.config.first_of_block(iteration),
+            first,
+            paths,
+        ]));
         scan(BufferId::LaneOffsets, lanes, recording);
         recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.lane_photons()));
     }
@@ -79,6 +88,7 @@ impl Stages<'_> {
         StageDesc::new(shader, threads).constants(vec![
             ("BRUTE_FORCE", u32::from(self.config.accel == Accel::Brute)),
             ("HAVEL", u32::from(self.config.triangle_test == TriangleTest::Havel)),
+            ("SAMPLER", self.config.sampler as u32),
             ("SLOTS", self.sizes.slots_per_pixel),
             ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
             ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),

@@ -5,7 +5,7 @@
 //! bounce. Where a ray passes an edge, or a random number lies next to a reflectance, rounding makes it take another
 //! way: those are the few that may differ.
 
-use ppm_vk::config::{Direct, Estimator, RenderConfig};
+use ppm_vk::config::{Direct, Estimator, RenderConfig, Sampler};
 use ppm_vk::cpu::{self, Counts};
 use ppm_vk::layout::{DirectSum, Light, VisiblePoint};
 use ppm_vk::record::Recording;
@@ -89,8 +89,15 @@ fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
     let mut recording = Recording::new();
     recording.fill(BufferId::DirectSums, 0);
     let slots = bench.renderer.sizes().slots();
-    let constants = vec![("SAMPLE_LIGHTS", u32::from(bench.config.direct == Direct::Light))];
-    recording.dispatch(StageDesc::new(&shaders::DIRECT, slots).constants(constants).push(0u32));
+    let constants = vec![
+        ("SAMPLE_LIGHTS", u32::from(bench.config.direct == Direct::Light)),
+        ("SAMPLER", bench.config.sampler as u32),
+    ];
+    recording.dispatch(
+        StageDesc::new(&shaders::DIRECT, slots)
+            .constants(constants)
+            .push([0u32; 2]),
+    );
     bench.renderer.run(&recording).expect("a run");
     bench.download(BufferId::DirectSums)
 }
@@ -141,14 +148,20 @@ fn light_that_is_seen_directly_agrees_without_sampling() {
 
 #[test]
 fn random_numbers_are_the_same_to_the_last_bit() {
+    for sampler in [Sampler::Sobol, Sampler::Independent, Sampler::Congruential] {
+        assert_same_random_numbers(sampler);
+    }
+}
+
+fn assert_same_random_numbers(sampler: Sampler) {
     // Each visible point chooses a light by its number u. With the lights' cumulative probabilities at u and at the
     // next number above, one bit more or less chooses another light; the radiance, in proportion to the light's area,
     // tells which one it was. The emitter is the same triangle for all.
-    let mut bench = Bench::new("light-area", small());
+    let mut bench = Bench::new("light-area", RenderConfig { sampler, ..small() });
     let points = bench.settings.resolution[0] * bench.settings.resolution[1];
     let step = 1.0 / f64::from(1 << 24);
     let mut thresholds: Vec<f64> = (0..points)
-        .map(|slot| cpu::Random::new(cpu::PathKind::LightSample, slot, 0, bench.settings.seed).next4()[0])
+        .map(|slot| cpu::Random::of_pixel(&bench.inputs(), cpu::PathKind::LightSample, slot, 0).next4()[0])
         .flat_map(|u| [u, u + step])
         .chain([1.0])
         .collect();
@@ -170,5 +183,5 @@ fn random_numbers_are_the_same_to_the_last_bit() {
     bench.upload(BufferId::Lights, &lights);
     // Two neighbouring lights of 8,193 differ by 1.2e-4 of their area at the least.
     bench.scene.lights = lights;
-    compare_direct(&mut bench, 6e-5).assert("choices that hang on the last bit", 0.999, 500);
+    compare_direct(&mut bench, 6e-5).assert(&format!("choices that hang on the last bit, {sampler:?}"), 0.999, 500);
 }
