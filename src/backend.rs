@@ -14,11 +14,18 @@ pub trait Backend {
     /// # Errors
     /// Whatever the device can't do.
     fn iterate(&mut self) -> Result<Run>;
-    /// The picture so far (eq. 4).
+    /// The picture so far (eq. 4), and what tells its bias.
     ///
     /// # Errors
     /// Whatever the device can't do.
-    fn resolve(&mut self) -> Result<Image>;
+    fn resolve_all(&mut self) -> Result<Resolved>;
+    /// The picture so far.
+    ///
+    /// # Errors
+    /// Whatever the device can't do.
+    fn resolve(&mut self) -> Result<Image> {
+        self.resolve_all().map(|resolved| resolved.image)
+    }
     /// Iterations done.
     fn iterations(&self) -> u32;
     /// Photon paths emitted in all iterations.
@@ -29,6 +36,25 @@ pub trait Backend {
     fn radius(&self) -> f32;
     /// What it runs on.
     fn device(&self) -> DeviceDescription;
+}
+
+/// A picture, and what tells its bias.
+#[derive(Debug, Clone)]
+pub struct Resolved {
+    /// The picture.
+    pub image: Image,
+    /// Of each pixel, its photons' flux weighed with 1 − 2 distance²/R², as radiance: see [`crate::estimate`].
+    pub curvature: Vec<f32>,
+}
+
+impl Resolved {
+    /// From a renderer's film: RGB and curvature, in rows from the top left.
+    pub fn from_film(resolution: [u32; 2], film: &[[f32; 4]]) -> Self {
+        Self {
+            image: Image::from_film(resolution, film),
+            curvature: film.iter().map(|pixel| pixel[3]).collect(),
+        }
+    }
 }
 
 /// What a render runs on, for reports.

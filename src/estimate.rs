@@ -1,12 +1,16 @@
 //! How far the picture is from the truth, as far as it can tell by itself.
 //!
-//! The picture after n iterations is the mean of n pictures that hardly depend on each other: eq. 3 scales τ as eq. 2 scales
-//! R², so τ / R² is the sum of every iteration's flux over its own R². Pictures that are taken now and then therefore give
-//! the means of batches of iterations, whose spread tells the noise. The bias falls with the radius: what the earlier half of
-//! the batches differs from the later one beyond their noise tells how much bias is left. (Hachisuka and others, «A
-//! Progressive Error Estimation Framework for Photon Density Estimation», 2010, have the same two parts, with the bias from
-//! derivatives of the kernel.)
+//! The picture after n iterations is the mean of n pictures: eq. 3 scales τ as eq. 2 scales R², so τ / R² is the sum of
+//! every iteration's flux over its own R². Pictures that are taken now and then therefore give the means of batches of
+//! iterations, which are independent of each other ([`crate::config::RenderConfig::block_of`]); their spread tells the
+//! noise.
+//!
+//! The bias is what R blurs. Photons are summed up a second time, weighed with 1 − 2 d²/R² by their distance d: where their
+//! density is even or falls evenly that sum vanishes, where it bends it is a third of what the blur adds, with the opposite
+//! sign. (Hachisuka and others, «A Progressive Error Estimation Framework for Photon Density Estimation», 2010, have the same
+//! two parts, and derivatives from a kernel of their own.)
 
+use crate::backend::Resolved;
 use crate::film::Image;
 use crate::metrics::REL_MSE_FLOOR;
 
@@ -14,6 +18,9 @@ use crate::metrics::REL_MSE_FLOOR;
 const MOST_BATCHES: usize = 8;
 /// Batches from which an estimate is made.
 const FEWEST_BATCHES: usize = 4;
+/// Bias over curvature, root of the mean square: 3 where the density bends evenly, for a disc's means of r² and of
+/// r² (1 − 2 r²) are 1/2 and −1/6; 5.46 across the edge of a shadow, by integrating both over its distance. Between them.
+const BIAS_PER_CURVATURE: f64 = 4.05;
 
 /// Pictures taken while a render goes on, and what follows from them.
 #[derive(Debug)]
@@ -22,7 +29,7 @@ pub struct ErrorEstimate {
     /// Iterations of a batch.
     batch: u32,
     /// Pictures after 1, 2, … batches.
-    pictures: Vec<Image>,
+    pictures: Vec<Resolved>,
 }
 
 /// An estimate of the relative error, as root of relMSE.
@@ -52,7 +59,7 @@ impl ErrorEstimate {
     }
 
     /// Takes the picture after so many iterations; those that aren't wanted are left out.
-    pub fn add(&mut self, iterations: u32, picture: Image) {
+    pub fn add(&mut self, iterations: u32, picture: Resolved) {
         if !self.wants(iterations) {
             return;
         }
@@ -69,44 +76,45 @@ impl ErrorEstimate {
         }
     }
 
-    /// Batches of which the estimate is made: an even number.
-    fn batches(&self) -> Option<&[Image]> {
-        let even = self.pictures.len() / 2 * 2;
-        (even >= FEWEST_BATCHES).then(|| &self.pictures[..even])
+    /// Batches of which the estimate is made.
+    fn batches(&self) -> Option<&[Resolved]> {
+        (self.pictures.len() >= FEWEST_BATCHES).then_some(&self.pictures)
     }
 
-    /// Each channel of each pixel.
-    fn samples(pictures: &[Image]) -> impl Iterator<Item = Sample> + '_ {
+    /// Mean of the batches and its squared standard error, from the values of the pictures after 1, 2, … of them.
+    fn mean_and_noise2(cumulative: impl Fn(usize) -> f32, count: usize) -> (f64, f64) {
+        let sum = |batches: usize| match batches {
+            0 => 0.0,
+            n => f64::from(cumulative(n - 1)) * n as f64,
+        };
+        let mean = sum(count) / count as f64;
+        let squares: f64 = (0..count).map(|n| (sum(n + 1) - sum(n) - mean).powi(2)).sum();
+        (mean, squares / (count * (count - 1)) as f64)
+    }
+
+    /// Each channel of each pixel: value, and squared standard error.
+    fn values(pictures: &[Resolved]) -> impl Iterator<Item = (f64, f64)> + '_ {
         let count = pictures.len();
-        let samples = pictures[count - 1].pixels().as_flattened().len();
-        (0..samples).map(move |index| {
-            let cumulative = |batches: usize| match batches {
-                0 => 0.0,
-                n => f64::from(pictures[n - 1].pixels().as_flattened()[index]) * n as f64,
-            };
-            let mean = |from: usize, to: usize| (cumulative(to) - cumulative(from)) / (to - from) as f64;
-            // Squared standard error of the mean of some batches.
-            let noise2 = |from: usize, to: usize| {
-                let middle = mean(from, to);
-                let squares: f64 = (from..to).map(|batch| (mean(batch, batch + 1) - middle).powi(2)).sum();
-                squares / ((to - from) * (to - from - 1)) as f64
-            };
-            let half = count / 2;
-            let difference = mean(0, half) - mean(half, count);
-            Sample {
-                value: mean(0, count),
-                noise2: noise2(0, count),
-                drift2: difference * difference - noise2(0, half) - noise2(half, count),
-            }
+        let samples = pictures[0].curvature.len() * 3;
+        (0..samples)
+            .map(move |index| Self::mean_and_noise2(|n| pictures[n].image.pixels().as_flattened()[index], count))
+    }
+
+    /// The squared bias of each pixel, in the mean of its channels; of noise alone it is 0 on average.
+    fn bias2(pictures: &[Resolved]) -> impl Iterator<Item = f64> + '_ {
+        let count = pictures.len();
+        (0..pictures[0].curvature.len()).map(move |pixel| {
+            let (mean, noise2) = Self::mean_and_noise2(|n| pictures[n].curvature[pixel], count);
+            (mean * mean - noise2) * BIAS_PER_CURVATURE.powi(2)
         })
     }
 
     /// The estimate after so many iterations; `None` before there are enough.
     pub fn relative(&self, iterations: u32) -> Option<RelativeError> {
         let pictures = self.batches()?;
-        let last = &pictures[pictures.len() - 1];
-        let values = last.pixels().as_flattened();
-        let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / values.len() as f64;
+        let values: Vec<(f64, f64)> = Self::values(pictures).collect();
+        let count = values.len() as f64;
+        let mean = values.iter().map(|(value, _)| value).sum::<f64>() / count;
         let floor = REL_MSE_FLOOR * mean * mean;
         if floor == 0.0 {
             return Some(RelativeError {
@@ -115,19 +123,23 @@ impl ErrorEstimate {
                 bias: 0.0,
             });
         }
-        let (mut noise2, mut drift2) = (0.0, 0.0);
-        for sample in Self::samples(pictures) {
-            let weight = 1.0 / (sample.value * sample.value + floor);
-            noise2 += sample.noise2 * weight;
-            drift2 += sample.drift2 * weight;
+        let (mut noise2, mut bias2) = (0.0, 0.0);
+        for (channels, bias) in values.chunks_exact(3).zip(Self::bias2(pictures)) {
+            let mean = channels.iter().map(|(value, _)| value).sum::<f64>() / 3.0;
+            for (value, noise) in channels {
+                let weight = 1.0 / (value * value + floor);
+                noise2 += noise * weight;
+                // Each channel has its share of the bias.
+                if mean > 0.0 {
+                    bias2 += bias * (value / mean).powi(2) * weight;
+                }
+            }
         }
-        let count = values.len() as f64;
         // Since the last picture the noise has fallen as n^−α, the bias as n^(α−1).
         let taken = f64::from(self.batch) * pictures.len() as f64;
         let since = f64::from(iterations.max(1)) / taken;
         let noise2 = noise2 / count * since.powf(-self.alpha);
-        let bias2 =
-            (drift2 / count).max(0.0) * self.bias_per_drift(taken).powi(2) * since.powf(2.0 * (self.alpha - 1.0));
+        let bias2 = (bias2 / count).max(0.0) * since.powf(2.0 * (self.alpha - 1.0));
         Some(RelativeError {
             total: (noise2 + bias2).sqrt(),
             noise: noise2.sqrt(),
@@ -135,39 +147,14 @@ impl ErrorEstimate {
         })
     }
 
-    /// The mean picture's bias over the difference between its halves': bias goes with R², and R² with i^(α−1).
-    fn bias_per_drift(&self, iterations: f64) -> f64 {
-        // The sum of i^(α−1) up to n, by the trapezoidal rule.
-        let alpha = self.alpha;
-        let up_to = |n: f64| (n.powf(alpha) - 1.0) / alpha + 0.5 * (1.0 + n.powf(alpha - 1.0));
-        let half = 0.5 * iterations;
-        let (early, late) = (up_to(half) / half, (up_to(iterations) - up_to(half)) / half);
-        up_to(iterations) / iterations / (early - late)
-    }
-
     /// Standard error of each pixel by noise, in units of radiance; `None` before there are enough iterations.
     pub fn standard_errors(&self) -> Option<Image> {
         let pictures = self.batches()?;
-        let last = &pictures[pictures.len() - 1];
-        let errors: Vec<f32> = Self::samples(pictures)
-            .map(|sample| sample.noise2.sqrt() as f32)
-            .collect();
-        let pixels = errors
-            .chunks_exact(3)
-            .map(|pixel| [pixel[0], pixel[1], pixel[2]])
-            .collect();
+        let last = &pictures[pictures.len() - 1].image;
+        let errors: Vec<f32> = Self::values(pictures).map(|(_, noise2)| noise2.sqrt() as f32).collect();
+        let pixels = errors.as_chunks().0.to_vec();
         Some(Image::new(last.width(), last.height(), pixels))
     }
-}
-
-/// A channel of a pixel.
-struct Sample {
-    /// Mean of all batches.
-    value: f64,
-    /// Its squared standard error.
-    noise2: f64,
-    /// Squared difference of the earlier and the later half, less its noise.
-    drift2: f64,
 }
 
 #[cfg(test)]
@@ -179,28 +166,27 @@ mod tests {
         f64::from(crate::cpu::pcg4d([index, seed, 7, 11])[0]) / 4_294_967_296.0
     }
 
-    /// Renders a picture of 1 everywhere, with noise of this deviation and a bias of `bias`·i^(α−1) in iteration i.
+    /// A picture of 1 everywhere after so many iterations, with noise of this deviation in each, a bias of
+    /// `bias`·i^(α−1) in iteration i, and the curvature that smooth light of that bias has, as noisy as the picture.
     fn rendered(iterations: u32, deviation: f64, bias: f64, alpha: f32) -> (ErrorEstimate, f64) {
         const PIXELS: usize = 2000;
         let mut estimate = ErrorEstimate::new(alpha);
-        let mut sums = vec![[0.0f64; 3]; PIXELS];
+        let mut sums = vec![[0.0f64; 4]; PIXELS];
         let mut last = Vec::new();
         for i in 1..=iterations {
+            let now = bias * f64::from(i).powf(f64::from(alpha) - 1.0);
             for (index, sum) in sums.iter_mut().flatten().enumerate() {
                 let noise = (random(index as u32, i) - 0.5) * 12f64.sqrt() * deviation;
-                *sum += 1.0 + noise + bias * f64::from(i).powf(f64::from(alpha) - 1.0);
+                *sum += noise + if index % 4 == 3 { -now / 3.0 } else { 1.0 + now };
             }
             last = sums
                 .iter()
                 .map(|sum| sum.map(|value| (value / f64::from(i)) as f32))
                 .collect();
-            estimate.add(i, Image::new(PIXELS, 1, last.clone()));
+            estimate.add(i, Resolved::from_film([PIXELS as u32, 1], &last));
         }
-        let squares: f64 = last
-            .iter()
-            .flatten()
-            .map(|&value| (f64::from(value) - 1.0).powi(2))
-            .sum();
+        let channels = last.iter().flat_map(|pixel: &[f32; 4]| &pixel[..3]);
+        let squares: f64 = channels.map(|&value| (f64::from(value) - 1.0).powi(2)).sum();
         let rel_mse = squares / (3 * PIXELS) as f64 / 1.01;
         (estimate, rel_mse.sqrt())
     }
@@ -212,19 +198,21 @@ mod tests {
             let found = estimate.relative(iterations).expect("an estimate");
             // This noise falls as n^−1, not n^−α: between pictures the estimate lags by a few per cent.
             assert!(
-                (found.total / truth - 1.0).abs() < 0.12,
+                (found.noise / truth - 1.0).abs() < 0.12,
                 "{iterations} iterations: {found:?}, the truth is {truth}"
             );
         }
     }
 
     #[test]
-    fn bias_is_estimated_from_the_halves() {
+    fn bias_is_estimated_from_the_curvature() {
         for alpha in [0.5, 2.0 / 3.0, 0.8] {
             let (estimate, truth) = rendered(192, 0.05, 0.1, alpha);
             let found = estimate.relative(192).expect("an estimate");
+            // Smooth light's bias is 3 times the curvature; edges have more, and the estimate lies between.
+            let expected = truth * BIAS_PER_CURVATURE / 3.0;
             assert!(
-                (found.total / truth - 1.0).abs() < 0.2,
+                (found.total / expected - 1.0).abs() < 0.1,
                 "α {alpha}: {found:?}, the truth is {truth}"
             );
             assert!(found.bias > found.noise, "α {alpha}: {found:?}");
@@ -239,7 +227,7 @@ mod tests {
                 estimate.relative(i).is_some(),
                 estimate.pictures.len() >= FEWEST_BATCHES
             );
-            estimate.add(i, Image::new(1, 1, vec![[1.0; 3]]));
+            estimate.add(i, Resolved::from_film([1, 1], &[[1.0; 4]]));
             assert!(estimate.pictures.len() <= MOST_BATCHES);
         }
         assert!(estimate.relative(1000).is_some());

@@ -32,7 +32,7 @@ impl Image {
         Self { width, height, pixels }
     }
 
-    /// A picture of a renderer's film: RGBA, in rows from the top left; alpha is left out.
+    /// A picture of a renderer's film: four numbers a pixel, in rows from the top left; the fourth is left out.
     ///
     /// # Panics
     /// As [`Image::new`].

@@ -188,16 +188,24 @@ device_structs! {
         pub accepted_low: u32,
         /// High word.
         pub accepted_high: u32,
-        /// rgb: τ, leading f32s.
+        /// rgb: τ, leading f32s; w: likewise of the curvature, whose share of τ tells the bias.
         pub flux_high: [f32; 4],
         /// rgb: τ, rest.
         pub flux_low: [f32; 4],
     }
 
     /// An iteration's photons of a visible point.
-    pub struct Gathered: 16 {
+    pub struct Gathered: 32 {
         /// rgb: Σ flux; w: u32 bits, M.
         pub flux_count: [f32; 4],
+        /// Σ flux · distance², flux as the mean of its channels.
+        pub moment: f32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+        /// Zero.
+        pub padding2: u32,
     }
 
     /// Radiance seen directly, summed over the iterations.

@@ -48,8 +48,7 @@ uvec2 photons_to_test(uint object) {
 void test(Receiver receiver, float radius, Photon photon, inout Sum sum) {
     // The built-in rounds as it likes; the margin leaves the last word to the predicate that all methods share.
     bool far = DISTANCE ? distance(photon.position_object.xyz, receiver.position) > radius * 1.00001 : false;
-    if (!far && accepts(receiver, photon)) {
-        sum.flux += photon.flux_direction.rgb;
-        sum.count += 1u;
+    if (!far) {
+        gather(receiver, photon, sum);
     }
 }

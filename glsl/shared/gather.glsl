@@ -33,9 +33,10 @@ float squared_distance(vec3 a, vec3 b) {
 }
 
 // The one predicate of every gather: on the same object, within R, and arriving on the side that the viewer sees.
-bool accepts(Receiver receiver, Photon photon) {
+bool accepts(Receiver receiver, Photon photon, out float distance2) {
     precise float cosine = dot(decode_octahedral(floatBitsToUint(photon.flux_direction.w)), receiver.normal);
-    return squared_distance(photon.position_object.xyz, receiver.position) <= receiver.radius2 &&
+    distance2 = squared_distance(photon.position_object.xyz, receiver.position);
+    return distance2 <= receiver.radius2 &&
            floatBitsToUint(photon.position_object.w) == receiver.object &&
            cosine < 0.0;
 }
@@ -44,12 +45,26 @@ bool accepts(Receiver receiver, Photon photon) {
 struct Sum {
     vec3 flux;
     uint count;
+    float moment; // see Gathered
 };
+
+const Sum NOTHING = Sum(vec3(0.0), 0u, 0.0);
+
+// Adds the photon if the receiver accepts it.
+void gather(Receiver receiver, Photon photon, inout Sum sum) {
+    float distance2;
+    bool accepted = accepts(receiver, photon, distance2);
+    vec3 flux = photon.flux_direction.rgb;
+    sum.flux += accepted ? flux : vec3(0.0);
+    sum.count += accepted ? 1u : 0u;
+    sum.moment += accepted ? mean_of(flux) * distance2 : 0.0;
+}
 
 void add_gathered(uint slot, Sum sum, uint tested) {
     vec4 before = gathered[slot].flux_count;
     gathered[slot].flux_count =
         vec4(before.rgb + sum.flux, uintBitsToFloat(floatBitsToUint(before.w) + sum.count));
+    gathered[slot].moment += sum.moment;
     if (COUNT_TESTS) {
         tests[slot] = (tests[slot] + tested) | GATHERED_FOR;
     }

@@ -5,14 +5,28 @@ struct Statistics {
     float radius2_low;
     uint accepted_low;  // photons accepted so far, 64 bits; eq. 2's N is α times this
     uint accepted_high;
-    vec4 flux_high;     // τ, two-float; w: unused
+    vec4 flux_high;     // τ, two-float; w: what of τ tells the bias, see `curvature`
     vec4 flux_low;
 };
 
-// A visible point's share of the iteration: rgb: Σ flux of the accepted photons; w: uint bits, M.
+// A visible point's share of the iteration.
 struct Gathered {
-    vec4 flux_count;
+    vec4 flux_count; // rgb: Σ flux of the accepted photons; w: uint bits, M
+    float moment;    // Σ flux · distance², flux as the mean of its channels
+    uint padding0;
+    uint padding1;
+    uint padding2;
 };
+
+float mean_of(vec3 v) {
+    return (v.r + v.g + v.b) * (1.0 / 3.0);
+}
+
+// Σ flux · (1 − 2 distance²/R²): 0 on average where photons lie evenly. Where their density bends, as r², it is −1/3 of
+// the flux that R makes too many.
+float curvature(Gathered gathered, float radius2) {
+    return mean_of(gathered.flux_count.rgb) - 2.0 * gathered.moment / radius2;
+}
 
 // Radiance that a visible point's path saw directly, summed over the iterations, two-float; w: unused.
 struct DirectSum {

@@ -26,5 +26,5 @@ void main() {
     if (found > push.wanted) {
         statistics[slot].radius2_high *= push.wanted / found;
     }
-    gathered[slot].flux_count = vec4(0.0);
+    gathered[slot] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
 }

@@ -58,7 +58,7 @@ void main() {
     ObjectGrid grid = object_grid(receiver.object);
     uvec3 low = cell_in(grid, lows[0]);
     uvec3 high = cell_in(grid, highs[0]);
-    Sum sum = Sum(vec3(0.0), 0u);
+    Sum sum = NOTHING;
     uint to_test = 0u;
     uint tested = 0u;
     uint rows = 0u;
@@ -72,10 +72,7 @@ void main() {
             for (uint i = first; i < end; i++) {
                 Photon photon = PHOTON(SortedPhotons, i);
                 tested += 1u;
-                if (accepts(receiver, photon)) {
-                    sum.flux += photon.flux_direction.rgb;
-                    sum.count += 1u;
-                }
+                gather(receiver, photon, sum);
             }
         }
     }

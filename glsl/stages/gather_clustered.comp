@@ -56,7 +56,7 @@ void main() {
         float reach = sqrt(receivers[k].radius2) * 1.000001 + 1e-7;
         lows[k] = cell_of(receivers[k].position - reach, inverse);
         highs[k] = cell_of(receivers[k].position + reach, inverse);
-        sums[k] = Sum(vec3(0.0), 0u);
+        sums[k] = NOTHING;
         tested_for[k] = 0u;
         pending[k] = receivers[k].object != NO_OBJECT;
         any_pending = any_pending || pending[k];
@@ -113,10 +113,10 @@ void main() {
                 Photon photon = PHOTON(SortedPhotons, i);
                 // Rows that share a bucket must not be counted twice.
                 bool here = i < end && row_of(cell_of(photon.position_object.xyz, inverse)) == row;
+                // No receiver is on that object.
+                photon.position_object.w = here ? photon.position_object.w : uintBitsToFloat(NO_OBJECT - 1u);
                 for (uint k = 0u; k < RUN; k++) {
-                    bool accepted = here && accepts(cluster[k], photon);
-                    sums[k].flux += accepted ? photon.flux_direction.rgb : vec3(0.0);
-                    sums[k].count += accepted ? 1u : 0u;
+                    gather(cluster[k], photon, sums[k]);
                 }
                 tested += i < end ? 1u : 0u;
                 i += 1u;

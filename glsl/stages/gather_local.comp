@@ -43,7 +43,7 @@ void main() {
     }
     uvec2 range = receivers > 0u ? photons_to_test(object) : uvec2(0u);
     float radius = sqrt(max(receiver.radius2, 0.0));
-    Sum sum = Sum(vec3(0.0), 0u);
+    Sum sum = NOTHING;
     for (uint first = range.x; first < range.y; first += gl_WorkGroupSize.x) {
         if (first + me < range.y) {
             block[me] = PHOTON(GatheredFrom, first + me);

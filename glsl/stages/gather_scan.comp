@@ -26,7 +26,7 @@ void main() {
     Receiver receiver = receiver_at(slot);
     uvec2 range = photons_to_test(receiver.object);
     float radius = sqrt(receiver.radius2);
-    Sum sum = Sum(vec3(0.0), 0u);
+    Sum sum = NOTHING;
     for (uint i = range.x; i < range.y; i++) {
         test(receiver, radius, PHOTON(GatheredFrom, i), sum);
     }

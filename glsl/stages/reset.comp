@@ -16,6 +16,6 @@ void main() {
     uint slot = invocation_index();
     if (slot < slots()) {
         statistics[slot] = Statistics(settings.initial_radius2, 0.0, 0u, 0u, vec4(0.0), vec4(0.0));
-        gathered[slot].flux_count = vec4(0.0);
+        gathered[slot] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
     }
 }

@@ -29,20 +29,20 @@ void main() {
     if (any(greaterThanEqual(pixel, settings.resolution))) {
         return;
     }
-    vec3 radiance = vec3(0.0);
+    vec4 radiance = vec4(0.0); // w: as if the photons' curvature were their flux
     for (uint i = 0u; i < settings.slots_per_pixel; i++) {
         uint slot = pixel_slot * settings.slots_per_pixel + i;
         Statistics mine = statistics[slot];
         DirectSum sum = direct_sums[slot];
         // The quotient of flux and emitted photons comes first: both grow without bound, it doesn't.
-        radiance += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
+        radiance.rgb += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
         if (mine.radius2_high > 0.0) {
-            radiance += (mine.flux_high.rgb + mine.flux_low.rgb) / push.emitted / (PI * mine.radius2_high);
+            radiance += (mine.flux_high + mine.flux_low) / push.emitted / (PI * mine.radius2_high);
         }
     }
-    if (!finite(radiance)) {
+    if (!finite(radiance.rgb) || isnan(radiance.w) || isinf(radiance.w)) {
         atomicAdd(status.non_finite, 1u);
-        radiance = vec3(0.0);
+        radiance = vec4(0.0);
     }
-    film[pixel.y * settings.resolution.x + pixel.x] = vec4(radiance, 1.0);
+    film[pixel.y * settings.resolution.x + pixel.x] = radiance;
 }

@@ -26,14 +26,15 @@ void main() {
     if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
         return;
     }
-    vec4 sum = gathered[slot].flux_count;
-    gathered[slot].flux_count = vec4(0.0);
-    vec3 flux = visible_point.weight_normal.rgb * sum.rgb;
-    if (!finite(flux)) {
+    Gathered arrived = gathered[slot];
+    gathered[slot] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
+    Statistics mine = statistics[slot];
+    vec3 weight = visible_point.weight_normal.rgb;
+    vec4 flux = vec4(weight * arrived.flux_count.rgb, mean_of(weight) * curvature(arrived, mine.radius2_high));
+    if (!finite(flux.rgb) || isnan(flux.w) || isinf(flux.w)) {
         atomicAdd(status.non_finite, 1u);
         return;
     }
-    Statistics mine = statistics[slot];
-    update_statistics(mine, flux, floatBitsToUint(sum.w), settings.alpha);
+    update_statistics(mine, flux, floatBitsToUint(arrived.flux_count.w), settings.alpha);
     statistics[slot] = mine;
 }

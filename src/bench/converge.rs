@@ -106,7 +106,7 @@ fn curve(what: &Converge, name: &str, renderer: &mut Renderer, config: &RenderCo
         let iterations = renderer.iterations();
         let last = wall_s >= what.seconds;
         if estimate.wants(iterations) {
-            estimate.add(iterations, renderer.resolve()?);
+            estimate.add(iterations, renderer.resolve_all()?);
         }
         if iterations == next || last {
             let comparison = compare(&renderer.resolve()?, what.reference)?;

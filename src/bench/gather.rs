@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use bytemuck::Zeroable;
 use serde::Serialize;
 
 use super::median;
@@ -263,7 +264,7 @@ fn input(renderer: &mut Renderer) -> Result<Input> {
         photons: renderer.gpu().download(BufferId::Photons, Some(count[0] as usize))?,
         expected: Vec::new(),
     };
-    let mut gathered = vec![Gathered { flux_count: [0.0; 4] }; input.points.len()];
+    let mut gathered = vec![Gathered::zeroed(); input.points.len()];
     cpu::gather_kd_tree(&input.points, &input.statistics, &input.photons, &mut gathered)?;
     input.expected = gathered.iter().map(count_of).collect();
     Ok(input)
@@ -390,7 +391,7 @@ impl Measured {
     fn cpu_naive(&self, input: &Input, stride: usize) -> f64 {
         let points: Vec<VisiblePoint> = input.points.iter().copied().step_by(stride).collect();
         let statistics: Vec<Statistics> = input.statistics.iter().copied().step_by(stride).collect();
-        let mut gathered = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
+        let mut gathered = vec![Gathered::zeroed(); points.len()];
         timed_us(|| cpu::gather_naive(&points, &statistics, &input.photons, &mut gathered)).1
     }
 
@@ -399,7 +400,7 @@ impl Measured {
             Runs::Device { .. } => phases(&renderer.gather(self.method, self.probe)?.0),
             Runs::CpuNaive => [0.0, 0.0, self.cpu_naive(input, self.probe.stride as usize)],
             Runs::CpuKdTree => {
-                let mut gathered = vec![Gathered { flux_count: [0.0; 4] }; input.points.len()];
+                let mut gathered = vec![Gathered::zeroed(); input.points.len()];
                 let (found, us) =
                     timed_us(|| cpu::gather_kd_tree(&input.points, &input.statistics, &input.photons, &mut gathered));
                 found?;

@@ -77,7 +77,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         }
         let iterations = backend.iterations();
         if estimate.wants(iterations) {
-            estimate.add(iterations, backend.resolve()?);
+            estimate.add(iterations, backend.resolve_all()?);
             error = estimate.relative(iterations).map(|error| error.total);
         }
         progress.show(backend.as_ref(), error);

@@ -32,7 +32,7 @@ pub fn direct(
             radiance += sample_direct(inputs, point, random.next4());
         }
         if radiance.is_finite() {
-            (sum.high, sum.low) = to_two_floats(from_two_floats(sum.high, sum.low) + radiance);
+            (sum.high, sum.low) = to_two_floats(from_two_floats(sum.high, sum.low) + radiance.extend(0.0));
         } else {
             counts.add_non_finite(1);
         }

@@ -5,7 +5,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 
 use super::sampling::decode_direction;
-use super::vector::{word, xyz};
+use super::vector::{mean, word, xyz};
 use crate::error::{Error, Result};
 use crate::layout::{Gathered, NO_OBJECT, Photon, Statistics, VisiblePoint};
 
@@ -13,24 +13,28 @@ use crate::layout::{Gathered, NO_OBJECT, Photon, Statistics, VisiblePoint};
 /// the predicate sum up differently.
 const MARGIN: f32 = 1.0 + 1e-5;
 
-/// Sum of flux and number of accepted photons. Thousands of f32 of like size add up in f64 without rounding, so the
+/// Sums of flux and of flux · distance², and number of accepted photons. Thousands of f32 of like size add up in f64 without rounding, so the
 /// order in which photons are found doesn't matter.
 #[derive(Default)]
 struct Sum {
     flux: DVec3,
     count: u32,
+    moment: f64,
 }
 
 impl Sum {
-    fn add(&mut self, photon: &Photon) {
-        self.flux += xyz(photon.flux_direction);
+    fn add(&mut self, photon: &Photon, distance2: f32) {
+        let flux = xyz(photon.flux_direction);
+        self.flux += flux;
         self.count += 1;
+        self.moment += mean(flux) * f64::from(distance2);
     }
 
     fn add_to(&self, gathered: &mut Gathered) {
         let flux = (xyz(gathered.flux_count) + self.flux).as_vec3();
         let count = word(gathered.flux_count) + self.count;
         gathered.flux_count = [flux.x, flux.y, flux.z, f32::from_bits(count)];
+        gathered.moment = (f64::from(gathered.moment) + self.moment) as f32;
     }
 }
 
@@ -58,14 +62,18 @@ impl Receiver {
         })
     }
 
-    /// `accepts` of `glsl/shared/gather.glsl`: within R, on the same object, and arriving on the side that the viewer
-    /// sees. The distance is rounded to f32 at each step as there, so that both count the same photons.
-    fn accepts(&self, photon: &Photon) -> bool {
+    /// `gather` of `glsl/shared/gather.glsl`: adds a photon within R, on the same object, that arrives on the side that the
+    /// viewer sees. The distance is rounded to f32 at each step as there, so that both count the same photons.
+    fn gather(&self, photon: &Photon, sum: &mut Sum) {
         let here = position(photon.position_object);
         let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| here[axis] - self.position[axis]);
-        x * x + y * y + z * z <= self.radius2
+        let distance2 = x * x + y * y + z * z;
+        if distance2 <= self.radius2
             && word(photon.position_object) == self.object
             && decode_direction(word(photon.flux_direction)).dot(self.normal) < 0.0
+        {
+            sum.add(photon, distance2);
+        }
     }
 }
 
@@ -94,8 +102,7 @@ pub fn gather_naive(
     gathered: &mut [Gathered],
 ) {
     for_each_receiver(visible_points, statistics, gathered, |receiver, sum| {
-        let accepted = photons.iter().filter(|photon| receiver.accepts(photon));
-        accepted.for_each(|photon| sum.add(photon));
+        photons.iter().for_each(|photon| receiver.gather(photon, sum));
     });
 }
 
@@ -119,12 +126,7 @@ pub fn gather_kd_tree(
         tree.query(&receiver.position)
             .within::<SquaredEuclidean<f32>>(receiver.radius2 * MARGIN)
             .unsorted()
-            .visit(|found| {
-                let photon = &photons[found.item as usize];
-                if receiver.accepts(photon) {
-                    sum.add(photon);
-                }
-            });
+            .visit(|found| receiver.gather(&photons[found.item as usize], sum));
     });
     Ok(())
 }

@@ -8,10 +8,9 @@ use super::{
     Batch, Counts, Inputs, camera, compact, direct, fit_radius, gather_kd_tree, gather_naive, photons, reset, resolve,
     update,
 };
-use crate::backend::{Backend, Counters, DeviceDescription, settings};
+use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Estimator, Limits, RenderConfig, Sizes};
 use crate::error::{Error, Result};
-use crate::film::Image;
 use crate::gather::{METHODS, Runs, default_cpu_method};
 use crate::layout::{DirectSum, Gathered, Settings, Statistics, VisiblePoint};
 use crate::radius;
@@ -118,16 +117,13 @@ impl Renderer {
         ));
         // The pilot is a batch; the densities of the whole iteration's photons are higher.
         let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
-        let radius = radius::automatic(&visible_points, &photons) as f32;
-        self.settings.initial_radius2 = radius * radius * share;
+        let automatic = radius::automatic(&visible_points, &photons);
+        self.settings.initial_radius2 = automatic.radius2 * share;
         self.statistics = vec![reset(self.settings.initial_radius2); slots];
         for _ in 0..radius::FITS {
             gather_kd_tree(&visible_points, &self.statistics, &photons, &mut self.gathered)?;
-            fit_radius(
-                radius::PHOTONS_WANTED as f32 * share,
-                &mut self.gathered,
-                &mut self.statistics,
-            );
+            let wanted = automatic.photons as f32 * share;
+            fit_radius(wanted, &mut self.gathered, &mut self.statistics);
         }
         Ok(())
     }
@@ -183,10 +179,10 @@ impl Backend for Renderer {
         Ok(clock.run)
     }
 
-    fn resolve(&mut self) -> Result<Image> {
+    fn resolve_all(&mut self) -> Result<Resolved> {
         let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
         let film = resolve(&self.settings, &self.statistics, &self.direct_sums, iterations, emitted);
-        Ok(Image::from_film(self.config.resolution, &film))
+        Ok(Resolved::from_film(self.config.resolution, &film))
     }
 
     fn iterations(&self) -> u32 {

@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::DVec4;
 
 use super::tiles::{pixel_of, pixel_slots};
-use super::vector::{from_two_float, from_two_floats, with_word};
+use super::vector::{from_two_float, from_two_floats};
 use crate::layout::{DirectSum, Settings, Statistics};
 
-/// The picture, RGBA, row by row from the top left: eq. 4 for each slot of a pixel, and the mean over the iterations
-/// of what was seen directly. `emitted` are the photon paths of all iterations.
+/// The picture, RGB and curvature, row by row from the top left: eq. 4 for each slot of a pixel, and the mean over the
+/// iterations of what was seen directly. `emitted` are the photon paths of all iterations.
 pub fn resolve(
     settings: &Settings,
     statistics: &[Statistics],
@@ -24,7 +24,7 @@ pub fn resolve(
         let Some([x, y]) = pixel_of(settings.resolution, pixel_slot as u32) else {
             continue;
         };
-        let mut radiance = DVec3::ZERO;
+        let mut radiance = DVec4::ZERO;
         for slot in pixel_slot * slots_per_pixel..(pixel_slot + 1) * slots_per_pixel {
             let (statistics, direct) = (&statistics[slot], &direct_sums[slot]);
             let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
@@ -34,7 +34,7 @@ pub fn resolve(
                 radiance += tau / (PI * radius2 * emitted as f64);
             }
         }
-        film[y as usize * width + x as usize] = with_word(radiance, 1.0f32.to_bits());
+        film[y as usize * width + x as usize] = radiance.as_vec4().to_array();
     }
     film
 }

@@ -4,7 +4,7 @@ use bytemuck::Zeroable;
 use rayon::prelude::*;
 
 use super::Counts;
-use super::vector::{from_two_float, from_two_floats, to_two_float, to_two_floats, word, xyz};
+use super::vector::{from_two_float, from_two_floats, mean, to_two_float, to_two_floats, word, xyz};
 use crate::layout::{Gathered, NO_OBJECT, RadiusSum, Statistics, VisiblePoint};
 
 /// Statistics before the first photon, with R² in square render units.
@@ -13,6 +13,11 @@ pub fn reset(initial_radius2: f32) -> Statistics {
         radius2_high: initial_radius2,
         ..Statistics::zeroed()
     }
+}
+
+/// Σ flux · (1 − 2 distance²/R²), flux as the mean of its channels: 0 on average where photons lie evenly.
+fn curvature(gathered: &Gathered, radius2: f64) -> f64 {
+    mean(xyz(gathered.flux_count)) - 2.0 * f64::from(gathered.moment) / radius2
 }
 
 /// Where a gather of pilot photons found more than `wanted`, shrinks the radius until it would hold as many; clears what
@@ -26,7 +31,7 @@ pub fn fit_radius(wanted: f32, gathered: &mut [Gathered], statistics: &mut [Stat
             if share < 1.0 {
                 statistics.radius2_high = (f64::from(statistics.radius2_high) * share) as f32;
             }
-            gathered.flux_count = [0.0; 4];
+            *gathered = Gathered::zeroed();
         });
 }
 
@@ -46,9 +51,11 @@ pub fn update(
             if word(point.position_object) == NO_OBJECT {
                 return;
             }
-            let flux = xyz(point.weight_normal) * xyz(gathered.flux_count);
+            let weight = xyz(point.weight_normal);
+            let curvature = mean(weight) * curvature(gathered, f64::from(statistics.radius2_high));
+            let flux = (weight * xyz(gathered.flux_count)).extend(curvature);
             let new_photons = word(gathered.flux_count);
-            gathered.flux_count = [0.0; 4];
+            *gathered = Gathered::zeroed();
             if !flux.is_finite() {
                 counts.add_non_finite(1);
             } else if new_photons > 0 {

@@ -1,6 +1,6 @@
 //! Between the device's layout and f64.
 
-use glam::DVec3;
+use glam::{DVec3, DVec4, Vec4};
 
 /// The first three of four.
 pub(super) fn xyz(v: [f32; 4]) -> DVec3 {
@@ -34,13 +34,18 @@ pub(super) fn to_two_float(value: f64) -> (f32, f32) {
     (high, (value - f64::from(high)) as f32)
 }
 
-/// [`from_two_float`] of each colour.
-pub(super) fn from_two_floats(high: [f32; 4], low: [f32; 4]) -> DVec3 {
-    xyz(high) + xyz(low)
+/// [`from_two_float`] of each of four.
+pub(super) fn from_two_floats(high: [f32; 4], low: [f32; 4]) -> DVec4 {
+    Vec4::from(high).as_dvec4() + Vec4::from(low).as_dvec4()
 }
 
-/// [`to_two_float`] of each colour.
-pub(super) fn to_two_floats(value: DVec3) -> ([f32; 4], [f32; 4]) {
-    let [r, g, b] = value.to_array().map(to_two_float);
-    ([r.0, g.0, b.0, 0.0], [r.1, g.1, b.1, 0.0])
+/// [`to_two_float`] of each of four.
+pub(super) fn to_two_floats(value: DVec4) -> ([f32; 4], [f32; 4]) {
+    let pairs = value.to_array().map(to_two_float);
+    (pairs.map(|pair| pair.0), pairs.map(|pair| pair.1))
+}
+
+/// The mean of the channels.
+pub(super) fn mean(v: DVec3) -> f64 {
+    v.element_sum() / 3.0
 }

@@ -4,10 +4,9 @@ mod stages;
 
 pub use stages::Stages;
 
-use crate::backend::{Backend, Counters, DeviceDescription, settings};
+use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Accel, Limits, Probe, RenderConfig, Sizes};
 use crate::error::{Error, Result};
-use crate::film::Image;
 use crate::gather::{METHODS, default_method};
 use crate::gpu::Device;
 use crate::layout::{
@@ -213,12 +212,12 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Backend::resolve`].
-    pub fn picture(&mut self) -> Result<(Run, Image)> {
+    pub fn picture(&mut self) -> Result<(Run, Resolved)> {
         let recording = self.stages().picture(self.iterations.max(1), self.emitted.max(1));
         let run = self.run(&recording)?;
         self.counters.non_finite += u64::from(self.status()?.non_finite);
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
-        Ok((run, Image::from_film(self.config.resolution, &film)))
+        Ok((run, Resolved::from_film(self.config.resolution, &film)))
     }
 
     /// Gathers the photons at hand with any method of a device; what was gathered before is forgotten. Returns what it
@@ -304,8 +303,8 @@ impl Renderer {
         let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
         // The pilot is a batch; the densities of the whole iteration's photons are higher.
         let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
-        let radius = radius::automatic(&visible_points, &photons) as f32;
-        self.settings.initial_radius2 = radius * radius * share;
+        let automatic = radius::automatic(&visible_points, &photons);
+        self.settings.initial_radius2 = automatic.radius2 * share;
         self.upload_settings()?;
         self.reset()?;
         for _ in 0..radius::FITS {
@@ -315,7 +314,7 @@ impl Renderer {
                 gather(stages.sizes, &mut recording);
                 recording
             })?;
-            let wanted = radius::PHOTONS_WANTED as f32 * share;
+            let wanted = automatic.photons as f32 * share;
             let mut recording = Recording::new();
             recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, self.sizes.slots()).push(wanted));
             self.run(&recording)?;
@@ -349,8 +348,8 @@ impl Backend for Renderer {
         Ok(run)
     }
 
-    fn resolve(&mut self) -> Result<Image> {
-        self.picture().map(|(_, image)| image)
+    fn resolve_all(&mut self) -> Result<Resolved> {
+        self.picture().map(|(_, resolved)| resolved)
     }
 
     fn iterations(&self) -> u32 {

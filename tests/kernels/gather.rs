@@ -1,5 +1,6 @@
 //! The gather methods: every one finds the same photons, N and M exactly, as testing each photon on the CPU.
 
+use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Probe, RenderConfig};
 use ppm_vk::cpu::{self, Counts};
@@ -43,7 +44,7 @@ fn assert_methods_agree(
         photons.len() <= bench.renderer.sizes().photon_capacity as usize,
         "more photons than the buffers hold"
     );
-    let mut expected = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
+    let mut expected = vec![Gathered::zeroed(); points.len()];
     cpu::gather_naive(points, statistics, photons, &mut expected);
     let mut updated = statistics.to_vec();
     cpu::update(
@@ -86,6 +87,13 @@ fn assert_methods_agree(
 fn assert_same_photons(what: &str, found: &[Gathered], expected: &[Gathered]) {
     for (slot, (found, expected)) in counts(found).iter().zip(counts(expected)).enumerate() {
         assert_eq!(*found, expected, "{what}, slot {slot}: M on the device, M on the CPU");
+    }
+    for (slot, (found, expected)) in found.iter().zip(expected).enumerate() {
+        let (found, expected) = (found.moment.into(), expected.moment.into());
+        assert!(
+            relative_difference(found, expected) <= 1e-5,
+            "{what}, slot {slot}: moment {found} on the device, {expected} on the CPU"
+        );
     }
 }
 

@@ -1,5 +1,6 @@
 //! The CPU's stages against each other and against what is known.
 
+use bytemuck::Zeroable;
 use glam::DVec3;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Accel, Direct, RenderConfig};
@@ -99,7 +100,7 @@ fn the_kd_tree_finds_what_testing_every_photon_finds() {
     let photons = cpu::compact(&cpu::photons(&inputs, batch, &counts));
     for radius in [0.2, 1.0, 5.0] {
         let statistics = vec![cpu::reset((radius * renderer.radius()).powi(2)); points.len()];
-        let nothing = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
+        let nothing = vec![Gathered::zeroed(); points.len()];
         let (mut found, mut expected) = (nothing.clone(), nothing);
         cpu::gather_kd_tree(&points, &statistics, &photons, &mut found).expect("few photons");
         cpu::gather_naive(&points, &statistics, &photons, &mut expected);

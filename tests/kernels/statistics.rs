@@ -1,5 +1,6 @@
 //! The stages `reset`, `update` and `resolve`.
 
+use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Estimator, RADIUS_GROUPS, RenderConfig};
 use ppm_vk::cpu::{self, Counts};
@@ -10,7 +11,7 @@ use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::agreement::relative_difference;
-use super::bench::{Bench, photon, random_numbers, small, visible_point, xyz};
+use super::bench::{Bench, photon, random_numbers, small, visible_point};
 
 /// Values of 1e-6 relative: the device keeps two f32 of each, 48 bits, but rounds the factors of eq. 2 to f32.
 const TOLERANCE: f64 = 1e-6;
@@ -76,7 +77,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
 
     let before = statistics.clone();
     let mut expected = statistics;
-    let mut gathered = vec![Gathered { flux_count: [0.0; 4] }; 64];
+    let mut gathered = vec![Gathered::zeroed(); 64];
     for _ in 0..ITERATIONS {
         cpu::gather_naive(&points, &before, &photons, &mut gathered);
         cpu::update(
@@ -102,7 +103,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
             difference < TOLERANCE,
             "slot {slot}, M = {m}: R² off by {difference:e}: {found:?}, {expected:?}"
         );
-        let tau = |s: &Statistics| (xyz(s.flux_high) + xyz(s.flux_low)).to_array();
+        let tau = |s: &Statistics| [0, 1, 2, 3].map(|i| f64::from(s.flux_high[i]) + f64::from(s.flux_low[i]));
         for (found, expected) in tau(found).into_iter().zip(tau(expected)) {
             let difference = relative_difference(found, expected);
             assert!(
@@ -130,6 +131,8 @@ fn radii_shrink_where_more_photons_than_wanted_were_found() {
     let gathered: Vec<Gathered> = (0..64)
         .map(|slot| Gathered {
             flux_count: [1.0, 2.0, 3.0, f32::from_bits(slot * slot)],
+            moment: 0.5,
+            ..Gathered::zeroed()
         })
         .collect();
     let statistics: Vec<Statistics> = random_numbers(64).map(|[u, ..]| cpu::reset(0.01 + u)).collect();
@@ -160,7 +163,7 @@ fn radii_shrink_where_more_photons_than_wanted_were_found() {
         );
     }
     for (slot, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
-        assert_eq!(gathered.flux_count, [0.0; 4], "slot {slot}");
+        assert_eq!(*gathered, Gathered::zeroed(), "slot {slot}");
     }
 }
 
@@ -191,7 +194,7 @@ fn radii_are_summed_up_and_updates_clear_what_was_gathered() {
         }
     }
     for (slot, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
-        assert_eq!(gathered.flux_count, [0.0; 4], "slot {slot}");
+        assert_eq!(*gathered, Gathered::zeroed(), "slot {slot}");
     }
 }
 
