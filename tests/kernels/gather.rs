@@ -91,7 +91,7 @@ fn assert_same_photons(what: &str, found: &[Gathered], expected: &[Gathered]) {
     for (slot, (found, expected)) in found.iter().zip(expected).enumerate() {
         let (found, expected) = (found.moment.into(), expected.moment.into());
         assert!(
-            relative_difference(found, expected) <= 1e-5,
+            relative_difference(found, expected) <= 5e-5,
             "{what}, slot {slot}: moment {found} on the device, {expected} on the CPU"
         );
     }
@@ -202,9 +202,9 @@ fn all_methods_agree_on_traced_photons_at_any_radius() {
         let m = assert_methods_agree(&mut bench, &case, &points, &statistics, &photons);
         means.push(m.iter().map(|&m| f64::from(m)).sum::<f64>() / m.len() as f64);
     }
-    // The radius is chosen for fifteen photons.
+    // The radius is chosen for 8 to 64 photons at the median visible point.
     println!("mean M at a quarter of, at, and at four times the automatic radius: {means:?}");
-    assert!(means[1] > 7.0 && means[1] < 30.0, "mean M {means:?}");
+    assert!(means[1] > 4.0 && means[1] < 128.0, "mean M {means:?}");
     assert!(means[0] < means[1] && means[1] < means[2], "mean M {means:?}");
 }
 
