@@ -16,7 +16,7 @@ from . import gltf
 def main():
     arguments = parse()
     try:
-        meshes, cameras = gltf.load(arguments.scene)
+        meshes, cameras = gltf.load(arguments.scene, arguments.matte)
         camera = choose(cameras, arguments.camera)
         if all(max(mesh.material.emission) == 0 for mesh in meshes):
             raise gltf.Unsupported("nothing in the scene emits light")
@@ -25,7 +25,7 @@ def main():
     except gltf.Unsupported as error:
         fail(f"{arguments.scene}: {error}")
     except OSError as error:
-        fail(str(error))
+        fail(f"{error.filename}: {error.strerror}")
     except (KeyError, IndexError, ValueError, TypeError) as error:
         fail(f"{arguments.scene}: this is no glTF file, or a damaged one ({type(error).__name__}: {error})")
     resolution = arguments.resolution or (256, max(1, round(256 / (camera.aspect or 1))))
@@ -48,8 +48,12 @@ def render(arguments, meshes, camera, resolution):
     if arguments.light_tracing:
         without = scenes.build(meshes, camera, resolution, has_specular=False)
         is_specular = rendering.sees_specular(scene)
+        groups = rendering.by_noise(scene, pixels[is_specular], without) if is_specular.any() else []
         parts = [
-            rendering.Paths("mirrors and glass", scene, pixels[is_specular], arguments.spp, without),
+            *(
+                rendering.Paths(f"mirrors and glass {number}", scene, group, arguments.spp, without)
+                for number, group in enumerate(groups, 1)
+            ),
             rendering.Paths("matte surfaces", scene, pixels[~is_specular], arguments.spp, without),
             rendering.Caustics(scene, without, pixels),
         ]
@@ -60,14 +64,13 @@ def render(arguments, meshes, camera, resolution):
     while estimate.go_on(arguments.spp, arguments.seconds):
         if estimate.has_error() and time.perf_counter() - told > 5:
             told = time.perf_counter()
-            parts = [f"{part.name} {part.spp()} samples, {100 * estimate.error(part):.2f} %" for part in estimate.parts]
-            print(f"{told - start:.0f} s: {'; '.join(parts)}; error {100 * estimate.error():.2f} %", file=sys.stderr)
+            print(f"{told - start:.0f} s: relative error {100 * estimate.error():.2f} %", file=sys.stderr)
 
     mean = estimate.mean()
     report = {
         "scene": str(arguments.scene),
         "by": f"Mitsuba {mitsuba.__version__}",
-        "spp": [part.spp() for part in estimate.parts] if arguments.light_tracing else estimate.parts[0].spp(),
+        "spp": {part.name: part.spp() for part in estimate.parts} if arguments.light_tracing else parts[0].spp(),
         "seconds": round(time.perf_counter() - start, 1),
         "rel_rmse_of_mean": float(f"{estimate.error():.3g}"),
         "mean": [round(value, 6) for value in mean.mean(axis=0).tolist()],
@@ -92,6 +95,11 @@ def parse():
         "--light-tracing",
         action="store_true",
         help="trace what mirrors and glass throw on matte surfaces from the lights: for caustics of small lights",
+    )
+    parser.add_argument(
+        "--matte",
+        action="store_true",
+        help="leave out the specular lobe that most glTF materials have over their base colour, as ppm-vk does",
     )
     arguments = parser.parse_args()
     if min(arguments.spp, arguments.seconds) == math.inf:

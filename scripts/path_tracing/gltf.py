@@ -65,14 +65,15 @@ COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 512
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
-def load(path):
-    """The meshes and cameras of the file's scene."""
-    return Reader(Path(path)).read()
+def load(path, is_matte=False):
+    """The meshes and cameras of the file's scene. With `is_matte` specular lobes over base colours are left out."""
+    return Reader(Path(path), is_matte).read()
 
 
 class Reader:
-    def __init__(self, path):
+    def __init__(self, path, is_matte):
         self.folder = path.parent
+        self.is_matte = is_matte
         data = path.read_bytes()
         self.chunk = None
         if data[:4] == b"glTF":
@@ -249,8 +250,8 @@ class Reader:
                 refuse("glass whose reflection doesn't follow from its index of refraction isn't supported")
         else:
             kind = "matte"
-            if specular.get("specularFactor", 1.0) != 0:
-                refuse("a specular lobe over the base colour isn't supported (a specularFactor of 0 turns it off)")
+            if specular.get("specularFactor", 1.0) != 0 and not self.is_matte:
+                refuse("a specular lobe over the base colour isn't supported (--matte leaves it out)")
         texture = self.texture(pbr["baseColorTexture"], refuse) if "baseColorTexture" in pbr else None
         if texture and kind != "matte":
             refuse("textures on metal and glass aren't supported")

@@ -1,5 +1,6 @@
 """Estimates of a scene's picture, part by part, with their variances."""
 
+import itertools
 import time
 
 import drjit as dr
@@ -16,6 +17,8 @@ ROULETTE_DEPTH = 5
 class Part:
     """A sum of samples for some of the pixels, all of one kind."""
 
+    numbers = itertools.count()
+
     def __init__(self, name, pixels, size):
         self.name = name
         self.pixels = pixels
@@ -24,6 +27,11 @@ class Part:
         self.count = 0  # independent samples in the sums
         self.passes = 0
         self.seconds = 0.0
+        self.first_seed = next(Part.numbers) << 24
+
+    def seed(self):
+        """A new one for each pass of each part."""
+        return self.first_seed + self.passes
 
     def go_on(self):
         start = time.perf_counter()
@@ -50,15 +58,15 @@ class Paths(Part):
         self.scene = scene
         self.without = without
         self.integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE_DEPTH})
-        # Sums within a pass are f32, and two passes are the least.
-        self.samples = int(np.clip(LANES // max(len(pixels), 1), 1, min(256, -(-spp // 2))))
+        # Two passes are the least.
+        self.samples = int(np.clip(LANES // max(len(pixels), 1), 1, np.ceil(spp / 2)))
 
     def spp(self):
         return self.count
 
     def render(self):
         sampler = mi.load_dict({"type": "independent"})
-        sampler.seed(self.passes, self.samples * len(self.pixels))
+        sampler.seed(self.seed(), self.samples * len(self.pixels))
         ray = primary_rays(self.scene, self.pixels, self.samples, sampler.next_2d())
         if self.without:
             is_specular = meets_specular(self.scene, ray)
@@ -67,8 +75,9 @@ class Paths(Part):
             radiance = dr.select(is_specular, some, others)
         else:
             radiance, _, _ = self.integrator.sample(self.scene, sampler, ray)
-        sums = [dr.block_sum(channel, self.samples) for channel in radiance]
-        squares = [dr.block_sum(channel * channel, self.samples) for channel in radiance]
+        wide = [mi.Float64(channel) for channel in radiance]
+        sums = [dr.block_sum(channel, self.samples) for channel in wide]
+        squares = [dr.block_sum(channel * channel, self.samples) for channel in wide]
         dr.eval(sums, squares)
         self.sum[self.pixels] += np.stack([channel.numpy() for channel in sums], axis=1)
         self.squares[self.pixels] += np.stack([channel.numpy() for channel in squares], axis=1)
@@ -91,7 +100,7 @@ class Caustics(Part):
 
     def render(self):
         pictures = [
-            np.array(mi.render(scene, integrator=self.integrator, seed=self.passes, spp=self.samples), float)
+            np.array(mi.render(scene, integrator=self.integrator, seed=self.seed(), spp=self.samples), float)
             for scene in self.scenes
         ]
         difference = (pictures[0] - pictures[1]).reshape(-1, 3)
@@ -125,6 +134,25 @@ def sees_specular(scene):
     offsets = (mi.Point2f(lane % 4, lane // 4 % 4) + 0.5) / 4
     is_specular = meets_specular(scene, primary_rays(scene, pixels, 16, offsets))
     return is_specular.numpy().reshape(len(pixels), 16).any(axis=1)
+
+
+def by_noise(scene, pixels, without):
+    """The pixels in groups of similar noise, most first, each twice as large as the one before. A few pixels have nearly all
+    the noise where mirrors or glass show caustics.
+
+    The samples that tell are thrown away: how many more a pixel gets must not depend on those that count.
+    """
+    pilot = Paths("pilot", scene, pixels, 512, without)
+    while pilot.spp() < 256:
+        pilot.go_on()
+    mean = pilot.mean()
+    noise = (pilot.variance_of_mean() / (mean**2 + 0.01 * mean[pixels].mean() ** 2)).mean(axis=1)
+    # Neighbours are alike, and a pixel's own samples too few.
+    width, height = scene.sensors()[0].film().size()
+    padded = np.pad(noise.reshape(height, width), 2)
+    noise = sum(padded[y : y + height, x : x + width] for y in range(5) for x in range(5)).ravel()[pixels]
+    ends = [len(pixels) >> halvings for halvings in range(6, 0, -1)]
+    return np.split(pixels[np.argsort(-noise)], ends)
 
 
 class Estimate:
