@@ -1,5 +1,9 @@
 // Equations 2 and 3. Include after two_float.glsl and gather.glsl.
 
+// R² where it stops shrinking, and τ with it: far below what positions resolve, far above the smallest f32. With an α next
+// to 0 it takes eq. 2 a few photons to get there; from then on their density is that at this radius.
+const float SMALLEST_RADIUS2 = 1e-24;
+
 float count_of(uint low, uint high) {
     return float(high) * 4294967296.0 + float(low);
 }
@@ -13,6 +17,10 @@ void update_statistics(inout Statistics statistics, vec4 new_flux, uint new_phot
     float m = float(new_photons);
     float rest = (n + alpha * m) / (n + m);
     float part = (1.0 - alpha) * m / (n + m);
+    if (statistics.radius2_high * rest < SMALLEST_RADIUS2) {
+        rest = 1.0;
+        part = 0.0;
+    }
     reduce_by(statistics.radius2_high, statistics.radius2_low, part, rest);
     add_to(statistics.flux_high.r, statistics.flux_low.r, new_flux.r);
     add_to(statistics.flux_high.g, statistics.flux_low.g, new_flux.g);

@@ -7,6 +7,9 @@ use super::Counts;
 use super::vector::{from_two_float, from_two_floats, mean, to_two_float, to_two_floats, word, xyz};
 use crate::layout::{Gathered, NO_OBJECT, RadiusSum, Statistics, VisiblePoint};
 
+/// R² where it stops shrinking, and τ with it: far below what positions resolve, far above the smallest f32.
+const SMALLEST_RADIUS2: f64 = 1e-24;
+
 /// Statistics before the first photon, with R² in square render units.
 pub fn reset(initial_radius2: f32) -> Statistics {
     Statistics {
@@ -62,8 +65,10 @@ pub fn update(
                 let alpha = f64::from(alpha);
                 let accepted = u64::from(statistics.accepted_low) | u64::from(statistics.accepted_high) << 32;
                 let (n, m) = (alpha * accepted as f64, f64::from(new_photons));
+                let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
                 let ratio = (n + alpha * m) / (n + m);
-                let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low) * ratio;
+                let ratio = if radius2 * ratio < SMALLEST_RADIUS2 { 1.0 } else { ratio };
+                let radius2 = radius2 * ratio;
                 let tau = (from_two_floats(statistics.flux_high, statistics.flux_low) + flux) * ratio;
                 let accepted = accepted + u64::from(new_photons);
                 (statistics.radius2_high, statistics.radius2_low) = to_two_float(radius2);
