@@ -140,7 +140,7 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         slots_per_pixel: 1,
         seed: config.seed,
         light_count: scene.lights.len() as u32,
-        light_flux: scene.light_flux as f32,
+        padding: 0,
         max_depth: config.max_depth,
         triangle_count: scene.shading_triangles.len() as u32,
         photon_lanes: 0,

@@ -63,8 +63,8 @@ device_structs! {
         pub seed: u32,
         /// Emissive triangles.
         pub light_count: u32,
-        /// Σ mean(Le) · π · area · sides over the lights.
-        pub light_flux: f32,
+        /// Zero.
+        pub padding: u32,
         /// Bounces of a path at the most.
         pub max_depth: u32,
         /// Triangles.
@@ -154,7 +154,7 @@ device_structs! {
         pub triangle: u32,
         /// Probability of this light and those before it.
         pub cumulative: f32,
-        /// Its probability, in proportion to its flux.
+        /// Its probability, nearly in proportion to its flux.
         pub probability: f32,
         /// Area.
         pub area: f32,

@@ -2,7 +2,7 @@
 struct Light {
     uint triangle;
     float cumulative;  // probability of this light and those before it
-    float probability; // in proportion to its flux
+    float probability; // nearly in proportion to its flux
     float area;        // render units²
 };
 

@@ -8,7 +8,7 @@ layout(std140) uniform Settings {
     uint slots_per_pixel;       // visible points a pixel
     uint seed;
     uint light_count;           // emissive triangles
-    float light_flux;           // of all lights together: Σ mean(Le) · π · area · sides, render units
+    uint padding;
     uint max_depth;             // bounces of a path at the most
     uint triangle_count;
     uint photon_lanes;          // invocations among which an iteration's photon paths are dealt

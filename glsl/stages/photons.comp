@@ -58,9 +58,8 @@ Path emit(inout Random random) {
     Path path;
     path.direction = cosine_direction(normal, u.zw);
     path.origin = offset_origin(emitter.position, normal);
-    // Lights are chosen in proportion to their mean flux, which cancels their area.
-    vec3 emission = material.emission;
-    path.flux = emission * (3.0 * settings.light_flux / (emission.r + emission.g + emission.b));
+    float sides = material.double_sided != 0u ? 2.0 : 1.0;
+    path.flux = material.emission * (PI * sides * light.area / choice.width);
     path.depth = 0u;
     path.ignored = light.triangle;
     path.seen_directly = true;

@@ -1,5 +1,7 @@
 //! Photon tracing, and moving the photons together.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -51,7 +53,7 @@ struct Path {
     seen_directly: bool,
 }
 
-/// Starts a path on a light chosen in proportion to its flux.
+/// Starts a path on a light.
 fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Path {
     let [choice, v, direction_u, direction_v] = random.next4();
     let [digits, side, ..] = random.next4();
@@ -66,9 +68,8 @@ fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Path {
     } else {
         emitter.geometric_normal
     };
-    let emission = rgb(emitter.material.emission);
-    // Le · π · area · sides over the light's probability, mean(Le) · π · area · sides / Σ(…).
-    let flux = emission * f64::from(inputs.settings.light_flux) / (emission.element_sum() / 3.0);
+    let sides = if emitter.material.double_sided != 0 { 2.0 } else { 1.0 };
+    let flux = rgb(emitter.material.emission) * (PI * sides * f64::from(light.area) / width);
     Path {
         ray: Ray {
             origin: offset_origin(emitter.position, normal),

@@ -11,6 +11,8 @@ pub struct EmissiveTriangle {
     pub triangle: u32,
     /// Its area, in square render units.
     pub area: f64,
+    /// The same, twice that if both sides emit.
+    pub emitting_area: f64,
     /// Emitted power: mean of the RGB radiance × π × area, twice that if both sides emit. Always positive.
     pub power: f64,
 }
@@ -18,22 +20,23 @@ pub struct EmissiveTriangle {
 impl Scene {
     /// The triangles that emit light, in the order of [`Scene::triangles`].
     ///
-    /// Their powers are what photons are emitted, and lights sampled, in proportion to.
+    /// Photons are emitted, and lights sampled, nearly in proportion to their powers.
     pub fn emissive_triangles(&self) -> Vec<EmissiveTriangle> {
         let emitting = self.objects.iter().filter_map(|object| {
             let material = &self.materials[object.material as usize];
             let radiance = material.emission.as_dvec3().element_sum() / 3.0;
             let sides = if material.double_sided { 2.0 } else { 1.0 };
-            (radiance > 0.0).then_some((object, radiance * PI * sides))
+            (radiance > 0.0).then_some((object, radiance * PI, sides))
         });
         emitting
-            .flat_map(|(object, exitance)| {
+            .flat_map(|(object, exitance, sides)| {
                 object.triangles.clone().map(move |triangle| {
                     let area = self.triangle_area(triangle);
                     EmissiveTriangle {
                         triangle,
                         area,
-                        power: exitance * area,
+                        emitting_area: sides * area,
+                        power: exitance * sides * area,
                     }
                 })
             })

@@ -22,8 +22,6 @@ pub struct PackedScene {
     pub materials: Vec<Material>,
     /// Emissive triangles.
     pub lights: Vec<Light>,
-    /// Σ mean(Le) · π · area · sides over the lights, render units.
-    pub light_flux: f64,
     /// The paper's grid of each object.
     pub object_grids: Vec<ObjectGrid>,
     /// Cells of all of them.
@@ -49,7 +47,7 @@ impl PackedScene {
             .collect();
         let bvh = bvh::build(&corners)?;
         let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| corners[index as usize]).collect();
-        let (lights, light_flux) = lights(scene, &bvh.order);
+        let lights = lights(scene, &bvh.order);
         let shaded = bvh.order.iter().zip(&corners);
         let mut shading_triangles: Vec<_> = shaded
             .map(|(&index, corners)| shading_triangle(scene, index, corners))
@@ -66,7 +64,6 @@ impl PackedScene {
             bsdf_sampling: bsdf_sampling(scene, &lights),
             materials: scene.materials.iter().map(material).collect(),
             lights,
-            light_flux,
             bvh: bvh.records,
             order: bvh.order,
             scale: scene.normalisation.scale,
@@ -149,31 +146,37 @@ fn bsdf_sampling(scene: &Scene, lights: &[Light]) -> f32 {
     ((emissive / all) as f32).clamp(0.05, 0.5)
 }
 
-/// Emissive triangles in leaf order, with probabilities in proportion to their flux.
-fn lights(scene: &Scene, order: &[u32]) -> (Vec<Light>, f64) {
+/// The part of all choices of a light that goes by emitting area instead of flux. A light that is a million million times
+/// dimmer than another one would never have its turn, and where it shines alone nothing would be seen. Where all lights
+/// have one radiance, both are the same.
+const BY_AREA: f64 = 0.1;
+
+/// Emissive triangles in leaf order, with probabilities in proportion to their flux, nearly.
+fn lights(scene: &Scene, order: &[u32]) -> Vec<Light> {
     let mut place = vec![0; order.len()];
     for (packed, &index) in order.iter().enumerate() {
         place[index as usize] = packed as u32;
     }
     let mut emissive = scene.emissive_triangles();
     emissive.sort_by_key(|light| place[light.triangle as usize]);
-    let total: f64 = emissive.iter().map(|light| light.power).sum();
+    let power: f64 = emissive.iter().map(|light| light.power).sum();
+    let area: f64 = emissive.iter().map(|light| light.emitting_area).sum();
     let mut before = 0.0;
     let count = emissive.len();
-    let lights = emissive
+    emissive
         .iter()
         .enumerate()
         .map(|(i, light)| {
-            before += light.power;
+            let probability = (1.0 - BY_AREA) * light.power / power + BY_AREA * light.emitting_area / area;
+            before += probability;
             Light {
                 triangle: place[light.triangle as usize],
-                cumulative: if i + 1 == count { 1.0 } else { (before / total) as f32 },
-                probability: (light.power / total) as f32,
+                cumulative: if i + 1 == count { 1.0 } else { before as f32 },
+                probability: probability as f32,
                 area: light.area as f32,
             }
         })
-        .collect();
-    (lights, total)
+        .collect()
 }
 
 /// Unit vector to two 16-bit numbers, as `glsl/shared/sampling.glsl` has it.

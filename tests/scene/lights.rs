@@ -18,10 +18,12 @@ fn power_is_mean_radiance_times_pi_times_area_and_sides() {
     let mut wanted = EmissiveTriangle {
         triangle: 2,
         area: 0.5,
+        emitting_area: 0.5,
         power: 4.0 * PI * 0.5,
     };
     assert_eq!(room.scene().emissive_triangles(), [wanted]);
     room.set("/materials/1/doubleSided", json!(true));
+    wanted.emitting_area *= 2.0;
     wanted.power *= 2.0;
     assert_eq!(room.scene().emissive_triangles(), [wanted]);
 }
