@@ -70,8 +70,9 @@ Boundary meet_boundary(Facing facing, vec3 incoming, float ior) {
 }
 
 // A ray that leaves the surface starts on the side that it flies to.
-vec3 origin_towards(vec3 position, vec3 geometric_normal, vec3 direction) {
-    return offset_origin(position, dot(direction, geometric_normal) >= 0.0 ? geometric_normal : -geometric_normal);
+vec3 origin_towards(Surface surface, vec3 direction) {
+    vec3 n = surface.geometric_normal;
+    return offset_origin(surface.position, dot(direction, n) >= 0.0 ? n : -n, surface.reach);
 }
 
 float largest(vec3 v) {

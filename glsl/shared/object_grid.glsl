@@ -24,3 +24,9 @@ uvec3 cell_in(ObjectGrid grid, vec3 position) {
 uint cell_number(ObjectGrid grid, uvec3 cell) {
     return grid.first_cell + (cell.z * grid.cells.y + cell.y) * grid.cells.x + cell.x;
 }
+
+// Largest coordinates of an object, without their signs, or a little more.
+vec3 reach_of(uint object) {
+    ObjectGrid grid = object_grid(object);
+    return max(abs(grid.low), abs(grid.low + vec3(grid.cells) / grid.inverse_cell));
+}

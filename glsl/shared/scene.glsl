@@ -70,6 +70,7 @@ struct Hit {
 // Where a ray met a surface.
 struct Surface {
     vec3 position;
+    vec3 reach;            // largest coordinates of the triangle's corners, without their signs
     vec3 geometric_normal; // of the triangle's front
     vec3 shading_normal;   // on the same side
     uint triangle;
@@ -97,6 +98,7 @@ Surface surface_at(uint index, vec2 uv) {
     vec3 e2 = triangle.p2.xyz - triangle.p0.xyz;
     Surface surface;
     surface.position = triangle.p0.xyz + uv.x * e1 + uv.y * e2;
+    surface.reach = max(max(abs(triangle.p0.xyz), abs(triangle.p1.xyz)), abs(triangle.p2.xyz));
     surface.geometric_normal = normalize(cross(e1, e2));
     surface.shading_normal = interpolated_normal(triangle, uv, surface.geometric_normal);
     surface.triangle = index;
@@ -106,16 +108,11 @@ Surface surface_at(uint index, vec2 uv) {
     return surface;
 }
 
-// Moves a ray's origin off its surface by integer steps of the floating-point grid: Wächter and Binder, «A Fast and
-// Robust Method for Avoiding Self-Intersection», Ray Tracing Gems, chapter 6. n points to the ray's side.
-vec3 offset_origin(vec3 p, vec3 n) {
-    const float NEAR_ORIGIN = 1.0 / 32.0;
-    const float FLOAT_STEP = 1.0 / 65536.0;
-    const float INT_STEP = 256.0;
-    ivec3 steps = ivec3(INT_STEP * n);
-    vec3 moved = intBitsToFloat(floatBitsToInt(p) + ivec3(p.x < 0.0 ? -steps.x : steps.x, p.y < 0.0 ? -steps.y : steps.y,
-                                                          p.z < 0.0 ? -steps.z : steps.z));
-    return vec3(abs(p.x) < NEAR_ORIGIN ? p.x + FLOAT_STEP * n.x : moved.x,
-                abs(p.y) < NEAR_ORIGIN ? p.y + FLOAT_STEP * n.y : moved.y,
-                abs(p.z) < NEAR_ORIGIN ? p.z + FLOAT_STEP * n.z : moved.z);
+// Moves a ray's origin off its surface, to the side of n, by a bound of the rounding errors of the position and of the
+// triangle's plane, both a few roundings of the corners' coordinates: Pharr, Jakob and Humphreys, «Physically Based
+// Rendering», 3rd edition, 2016, section 3.9.5. Near the origin, where floats are fine, so is the step: what lies a
+// hundred-millionth of the scene away isn't jumped over.
+vec3 offset_origin(vec3 p, vec3 n, vec3 reach) {
+    const float ROUNDINGS = 16.0 / 16777216.0;
+    return p + ROUNDINGS * dot(abs(n), reach) * n;
 }

@@ -101,7 +101,6 @@ void main() {
                 branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * material.emission;
             }
             branch.emission_seen = false;
-            vec3 origin = surface.position;
             if (material.surface == MATTE) {
                 if (largest(material.base_color) > 0.0) {
                     visible_point.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
@@ -131,7 +130,7 @@ void main() {
                         other.direction = boundary.reflected;
                         other.throughput *= boundary.reflectance;
                         other.emitted = vec3(0.0);
-                        other.origin = origin_towards(origin, facing.geometric_normal, other.direction);
+                        other.origin = origin_towards(surface, other.direction);
                         pending[pending_count] = other;
                         pending_count += 1u;
                         branch.throughput *= 1.0 - boundary.reflectance;
@@ -139,7 +138,7 @@ void main() {
                     } else if (!branch.reflection_seen && boundary.reflectance < 1.0) {
                         // A lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
                         branch.reflection_seen = true;
-                        vec3 from = origin_towards(origin, facing.geometric_normal, boundary.reflected);
+                        vec3 from = origin_towards(surface, boundary.reflected);
                         Glimpse reflection = glimpse(from, boundary.reflected, hit.triangle);
                         branch.emitted += branch.throughput * boundary.reflectance * reflection.emission;
                         if (reflection.dark) {
@@ -152,7 +151,7 @@ void main() {
                     branch.direction = reflect_now ? boundary.reflected : boundary.refracted;
                     branch.throughput *= reflect_now ? vec3(1.0) : transmission;
                 }
-                branch.origin = origin_towards(origin, facing.geometric_normal, branch.direction);
+                branch.origin = origin_towards(surface, branch.direction);
             }
         }
         if (ended) {

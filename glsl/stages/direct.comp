@@ -14,6 +14,7 @@ layout(local_size_x = 64) in;
 #include "intersect.glsl"
 #include "bsdf.glsl"
 #include "light.glsl"
+#include "object_grid.glsl"
 #include "visible_point.glsl"
 #include "two_float.glsl"
 #include "statistics.glsl"
@@ -29,6 +30,9 @@ layout(push_constant) uniform Push {
 uniform usamplerBuffer VisiblePoints;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 
+// A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
+const float ENDS_BEFORE = 16.0 / 16777216.0;
+
 // One ray, by chance towards a point of a light or along a direction of the BSDF, with the density of both together
 // (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
 // variance next to a light.
@@ -40,7 +44,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     vec3 position = visible_point.position_object.xyz;
     vec3 geometric_normal = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
     vec3 shading_normal = decode_direction(floatBitsToUint(visible_point.emitted_normal.w));
-    vec3 origin = offset_origin(position, geometric_normal);
+    vec3 origin = offset_origin(position, geometric_normal, reach_of(floatBitsToUint(visible_point.position_object.w)));
     vec3 ray = cosine_direction(shading_normal, u.yz);
     uint ignored = MISS;
     Surface emitter;
@@ -49,13 +53,14 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
         emitter = surface_at(light.triangle, triangle_point(u.yz));
         bool front = dot(position - emitter.position, emitter.geometric_normal) > 0.0;
         // Both ends move off their surfaces.
-        ray = offset_origin(emitter.position, front ? emitter.geometric_normal : -emitter.geometric_normal) - origin;
+        ray = offset_origin(emitter.position, front ? emitter.geometric_normal : -emitter.geometric_normal,
+                            emitter.reach) - origin;
         ignored = light.triangle;
     }
     if (dot(ray, geometric_normal) <= 0.0 || dot(ray, shading_normal) <= 0.0) {
         return vec3(0.0);
     }
-    Hit hit = trace(origin, ray, by_bsdf ? 1e30 : 1.0, ignored, !by_bsdf);
+    Hit hit = trace(origin, ray, by_bsdf ? 1e30 : 1.0 - ENDS_BEFORE, ignored, !by_bsdf);
     if (loops_cut) {
         atomicAdd(status.cut_paths, 1u);
         return vec3(0.0);

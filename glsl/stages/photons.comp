@@ -57,7 +57,7 @@ Path emit(inout Random random) {
     }
     Path path;
     path.direction = cosine_direction(normal, u.zw);
-    path.origin = offset_origin(emitter.position, normal);
+    path.origin = offset_origin(emitter.position, normal, emitter.reach);
     float sides = material.double_sided != 0u ? 2.0 : 1.0;
     path.flux = material.emission * (PI * sides * light.area / choice.width);
     path.depth = 0u;
@@ -150,7 +150,7 @@ void main() {
             path.direction = reflected ? boundary.reflected : boundary.refracted;
             path.seen_directly = false;
         }
-        path.origin = origin_towards(surface.position, facing.geometric_normal, path.direction);
+        path.origin = origin_towards(surface, path.direction);
         path.ignored = hit.triangle;
         path.depth += 1u;
         if (alive && path.depth >= settings.max_depth) {

@@ -146,7 +146,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
                     Some(refracted) if used + pending.len() + 1 < slots.len() => {
                         pending.push(Branch {
                             ray: Ray {
-                                origin: facing.origin_towards(surface.position, boundary.reflected),
+                                origin: surface.origin_towards(boundary.reflected),
                                 direction: boundary.reflected,
                             },
                             throughput: branch.throughput * boundary.reflectance,
@@ -161,7 +161,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
                         if !branch.reflection_seen {
                             branch.reflection_seen = true;
                             let ray = Ray {
-                                origin: facing.origin_towards(surface.position, boundary.reflected),
+                                origin: surface.origin_towards(boundary.reflected),
                                 direction: boundary.reflected,
                             };
                             let (emission, dark) = glimpse(inputs, ray, Some(hit.triangle));
@@ -182,7 +182,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
                     None => boundary.reflected,
                 }
             };
-            branch.ray.origin = facing.origin_towards(surface.position, branch.ray.direction);
+            branch.ray.origin = surface.origin_towards(branch.ray.direction);
         };
         used += 1;
     }

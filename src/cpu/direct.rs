@@ -10,7 +10,7 @@ use super::intersect::{Ray, is_blocked, nearest_hit};
 use super::light::{choose_light, emits};
 use super::random::{PathKind, Random};
 use super::sampling::{cosine_direction, decode_direction, triangle_point};
-use super::surface::{offset_origin, surface_at};
+use super::surface::{offset_origin, reach_of, surface_at};
 use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
@@ -39,6 +39,9 @@ pub fn direct(
     });
 }
 
+/// A shadow ray ends this part of its length before the light, as it does on a device.
+const ENDS_BEFORE: f64 = 16.0 / 16_777_216.0;
+
 /// weight · Le · cos θ_surface over the density per solid angle of both ways to choose the ray: towards a point of a
 /// light chosen in proportion to its flux, or along a direction of the BSDF.
 fn sample_direct(inputs: &Inputs<'_>, point: &VisiblePoint, [choice, u, v, way]: [f64; 4]) -> DVec3 {
@@ -46,7 +49,11 @@ fn sample_direct(inputs: &Inputs<'_>, point: &VisiblePoint, [choice, u, v, way]:
     let position = xyz(point.position_object);
     let geometric_normal = decode_direction(word(point.weight_normal));
     let shading_normal = decode_direction(word(point.emitted_normal));
-    let origin = offset_origin(position, geometric_normal);
+    let origin = offset_origin(
+        position,
+        geometric_normal,
+        reach_of(inputs.scene, word(point.position_object)),
+    );
     let leaves = |ray: DVec3| ray.dot(geometric_normal) > 0.0 && ray.dot(shading_normal) > 0.0;
 
     let emitter = if by_bsdf {
@@ -65,8 +72,9 @@ fn sample_direct(inputs: &Inputs<'_>, point: &VisiblePoint, [choice, u, v, way]:
         } else {
             -emitter.geometric_normal
         };
-        let direction = offset_origin(emitter.position, towards_surface) - origin;
-        let reaches = leaves(direction) && !is_blocked(inputs, Ray { origin, direction }, 1.0, Some(light.triangle));
+        let direction = offset_origin(emitter.position, towards_surface, emitter.reach) - origin;
+        let ray = Ray { origin, direction };
+        let reaches = leaves(direction) && !is_blocked(inputs, ray, 1.0 - ENDS_BEFORE, Some(light.triangle));
         reaches.then_some(emitter)
     };
     let Some(emitter) = emitter.filter(|emitter| emitter.light != NO_LIGHT) else {

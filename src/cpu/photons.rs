@@ -72,7 +72,7 @@ fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Path {
     let flux = rgb(emitter.material.emission) * (PI * sides * f64::from(light.area) / width);
     Path {
         ray: Ray {
-            origin: offset_origin(emitter.position, normal),
+            origin: offset_origin(emitter.position, normal, emitter.reach),
             direction: cosine_direction(normal, direction_u, direction_v),
         },
         flux,
@@ -139,7 +139,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         let Some(flux) = flux else { return };
         path = Path {
             ray: Ray {
-                origin: facing.origin_towards(surface.position, direction),
+                origin: surface.origin_towards(direction),
                 direction,
             },
             flux,

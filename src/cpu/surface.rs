@@ -16,6 +16,8 @@ pub(super) const MIRROR: u32 = 1;
 /// A point of a triangle.
 pub(super) struct Surface<'a> {
     pub position: DVec3,
+    /// Largest coordinates of the triangle's corners, without their signs.
+    pub reach: DVec3,
     /// Unit vector on the triangle's front.
     pub geometric_normal: DVec3,
     /// On the same side.
@@ -33,11 +35,21 @@ pub(super) fn surface_at(scene: &PackedScene, triangle: u32, u: f64, v: f64) -> 
     let geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
     Surface {
         position: p0 + u * (p1 - p0) + v * (p2 - p0),
+        reach: p0.abs().max(p1.abs()).max(p2.abs()),
         geometric_normal,
         shading_normal: interpolated_normal(triangle, u, v, geometric_normal),
         object: triangle.object,
         material: &scene.materials[triangle.material as usize],
         light: triangle.light,
+    }
+}
+
+impl Surface<'_> {
+    /// Where a ray starts that leaves in `direction`: on the side that it flies to.
+    pub fn origin_towards(&self, direction: DVec3) -> DVec3 {
+        let n = self.geometric_normal;
+        let n = if direction.dot(n) >= 0.0 { n } else { -n };
+        offset_origin(self.position, n, self.reach)
     }
 }
 
@@ -55,22 +67,20 @@ fn interpolated_normal(triangle: &ShadingTriangle, u: f64, v: f64, geometric_nor
     }
 }
 
-/// Moves a ray's origin off its surface, to the side of `n`, by integer steps of the f32 grid: Wächter and Binder, «A
-/// Fast and Robust Method for Avoiding Self-Intersection», Ray Tracing Gems, chapter 6. The result is exact in f32.
-pub(super) fn offset_origin(position: DVec3, n: DVec3) -> DVec3 {
-    const NEAR_ORIGIN: f32 = 1.0 / 32.0;
-    const FLOAT_STEP: f64 = 1.0 / 65536.0;
-    const INT_STEP: f64 = 256.0;
-    let moved = |p: f64, n: f64| {
-        let rounded = p as f32;
-        if rounded.abs() < NEAR_ORIGIN {
-            return f64::from((f64::from(rounded) + FLOAT_STEP * n) as f32);
-        }
-        // The bits of a float grow with its magnitude.
-        let steps = (INT_STEP * n) as i32 * if rounded < 0.0 { -1 } else { 1 };
-        f64::from(f32::from_bits(rounded.to_bits().wrapping_add_signed(steps)))
-    };
-    DVec3::new(moved(position.x, n.x), moved(position.y, n.y), moved(position.z, n.z))
+/// Moves a ray's origin off its surface, to the side of `n`, by a bound of the rounding errors that positions and planes
+/// of triangles with corners up to `reach` have on a device: Pharr, Jakob and Humphreys, «Physically Based Rendering»,
+/// 3rd edition, 2016, section 3.9.5.
+pub(super) fn offset_origin(position: DVec3, n: DVec3, reach: DVec3) -> DVec3 {
+    const ROUNDINGS: f64 = 16.0 / 16_777_216.0;
+    position + ROUNDINGS * n.abs().dot(reach) * n
+}
+
+/// Largest coordinates of an object, without their signs, or a little more.
+pub(super) fn reach_of(scene: &PackedScene, object: u32) -> DVec3 {
+    let grid = &scene.object_grids[object as usize];
+    let low = rgb(grid.low);
+    let size = DVec3::from_array(grid.cells.map(f64::from)) / f64::from(grid.inverse_cell);
+    low.abs().max((low + size).abs())
 }
 
 /// A ray's meeting with a surface, with both normals turned to the side that the ray comes from.
@@ -108,16 +118,6 @@ impl Facing {
         } else {
             about(self.geometric_normal).normalize()
         }
-    }
-
-    /// Where a ray starts that leaves `position` in `direction`: on the side that it flies to.
-    pub fn origin_towards(&self, position: DVec3, direction: DVec3) -> DVec3 {
-        let side = if direction.dot(self.geometric_normal) >= 0.0 {
-            1.0
-        } else {
-            -1.0
-        };
-        offset_origin(position, side * self.geometric_normal)
     }
 
     /// Reflectance of a mirror with this base colour: Schlick's approximation, as glTF 2.0, appendix B, has it.
@@ -219,12 +219,12 @@ mod tests {
     }
 
     #[test]
-    fn offset_origins_lie_on_the_normals_side_and_near() {
-        for position in [DVec3::new(0.9, -0.4, 1e-3), DVec3::new(-1.0, 0.0, 0.03125)] {
+    fn offset_origins_lie_on_the_normals_side_and_as_near_as_floats_are_fine() {
+        for position in [DVec3::new(0.9, -0.4, 1e-3), DVec3::new(-1e-8, 0.0, 3e-9)] {
             for n in [DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.36, 0.48, -0.8)] {
-                let moved = offset_origin(position, n) - position;
+                let moved = offset_origin(position, n, position.abs()) - position;
                 assert!(moved.dot(n) > 0.0, "{moved} doesn't lead to the side of {n}");
-                assert!(moved.length() < 4e-5, "{moved} is far");
+                assert!(moved.length() < 2e-6 * position.length(), "{moved} is far");
             }
         }
     }
