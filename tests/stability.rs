@@ -1,0 +1,38 @@
+//! Hard cases: scenes, settings and numbers at the edge of what a renderer can be given, each with a measure that shows
+//! that the picture is right there. docs/stability.md lists them, and what happens without the guard of each.
+//!
+//! Every picture and buffer of every case is searched for NaN, infinity and negative values (`sound`).
+
+// Each test program uses a part of what they share.
+#[allow(dead_code)]
+#[path = "kernels/bench.rs"]
+mod bench;
+#[allow(dead_code)]
+#[path = "scene/fixture.rs"]
+mod fixture;
+
+#[path = "stability/capacity.rs"]
+mod capacity;
+#[path = "stability/geometry.rs"]
+mod geometry;
+#[path = "stability/glass.rs"]
+mod glass;
+#[path = "stability/lights.rs"]
+mod lights;
+#[path = "stability/model.rs"]
+mod model;
+#[path = "stability/places.rs"]
+mod places;
+#[path = "stability/scales.rs"]
+mod scales;
+#[path = "stability/sound.rs"]
+mod sound;
+#[path = "stability/sums.rs"]
+mod sums;
+#[path = "stability/uniform.rs"]
+mod uniform;
+
+/// Whether tests of minutes run as well.
+fn long() -> bool {
+    std::env::var_os("PPM_VK_LONG").is_some()
+}

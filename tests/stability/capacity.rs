@@ -1,0 +1,168 @@
+//! Grids that would have more cells than memory, radii of every size, photons that don't fit.
+
+use glam::Vec3;
+use ppm_vk::config::{Direct, Probe, RenderConfig};
+use ppm_vk::cpu;
+use ppm_vk::gather::METHODS;
+use ppm_vk::layout::{Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::stage::BufferId;
+
+use super::bench::{Bench, object, photon, random_numbers, visible_point, xyz};
+use super::model::Model;
+use super::sound::{assert_sound, render, render_within, square};
+
+/// Gathers by every method of a device; each finds M photons as testing each of them on the CPU does. Returns M.
+fn assert_gathers_agree(
+    bench: &mut Bench,
+    what: &str,
+    points: &[VisiblePoint],
+    statistics: &[Statistics],
+    photons: &[Photon],
+) -> Vec<u32> {
+    let mut expected = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
+    cpu::gather_naive(points, statistics, photons, &mut expected);
+    bench.upload(BufferId::VisiblePoints, points);
+    bench.upload(BufferId::StatisticsOf, statistics);
+    bench.upload(BufferId::Photons, photons);
+    bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);
+    let count = |gathered: &Gathered| gathered.flux_count[3].to_bits();
+    for (index, method) in METHODS
+        .iter()
+        .enumerate()
+        .filter(|(_, method)| method.stages().is_some())
+    {
+        bench.renderer.gather(index, Probe::default()).expect("a gather");
+        let found: Vec<Gathered> = bench.download(BufferId::GatheredOf);
+        for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            assert_eq!(count(found), count(expected), "{what}, {}, slot {slot}: M", method.name);
+        }
+        assert_sound(&mut bench.renderer);
+    }
+    expected.iter().map(count).collect()
+}
+
+fn with_radius(radius: f64) -> RenderConfig {
+    RenderConfig {
+        radius: Some(radius),
+        ..square(32, 5000)
+    }
+}
+
+/// Cells of the hashed grid are 1.5 R wide: 2 / 2e-5 along each side of the scene.
+#[test]
+fn a_grid_of_1e15_cells_takes_no_more_memory_and_finds_every_photon() {
+    const RADIUS: f32 = 1.3e-5;
+    let mut bench = Bench::new("cornell", with_radius(RADIUS.into()));
+    assert_sound(&mut bench.renderer);
+    let large = Bench::new("cornell", with_radius(0.1));
+    for id in [BufferId::CellStarts, BufferId::ObjectCells] {
+        assert_eq!(
+            bench.renderer.sizes().bytes(id),
+            large.renderer.sizes().bytes(id),
+            "{id:?}"
+        );
+    }
+    let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
+    // One photon within R of every visible point, one past it.
+    let mut photons = Vec::new();
+    for point in &points {
+        if let Some(object) = object(point.position_object) {
+            let normal = cpu::decode_direction(point.weight_normal[3].to_bits());
+            let aside = normal.any_orthonormal_vector();
+            for part in [0.5, 1.5] {
+                let place = xyz(point.position_object) + aside * (part * f64::from(RADIUS));
+                let mut near = photon(place.as_vec3().to_array(), object, [1.0; 3]);
+                near.flux_direction[3] = f32::from_bits(cpu::encode_direction(-normal));
+                photons.push(near);
+            }
+        }
+    }
+    let statistics = vec![cpu::reset(RADIUS * RADIUS); points.len()];
+    let found = assert_gathers_agree(&mut bench, "1e15 cells", &points, &statistics, &photons);
+    for (slot, (m, point)) in found.iter().zip(&points).enumerate() {
+        let expected = u32::from(object(point.position_object).is_some());
+        assert!(
+            *m >= expected,
+            "slot {slot}: the photon beside its visible point isn't found"
+        );
+    }
+    assert!(photons.len() > 1800, "only {} photons", photons.len());
+}
+
+#[test]
+fn radii_that_differ_by_a_million_in_one_picture_find_their_photons() {
+    let mut bench = Bench::new("cornell", with_radius(1.0));
+    let radii: Vec<f32> = random_numbers(1024).map(|[.., u]| 10f32.powf(-6.0 * u)).collect();
+    let places: Vec<[f32; 3]> = random_numbers(1024)
+        .map(|[x, y, ..]| [2.0 * x - 1.0, 2.0 * y - 1.0, 0.5])
+        .collect();
+    let points: Vec<VisiblePoint> = places.iter().map(|place| visible_point(*place, 0)).collect();
+    let statistics: Vec<Statistics> = radii.iter().map(|radius| cpu::reset(radius * radius)).collect();
+    let near = |part: f32| {
+        places
+            .iter()
+            .zip(&radii)
+            .map(move |([x, y, z], r)| photon([x + part * r, *y, *z], 0, [1.0; 3]))
+    };
+    let photons: Vec<Photon> = near(0.5).chain(near(1.5)).collect();
+    let found = assert_gathers_agree(&mut bench, "radii from 1e-6 to 1", &points, &statistics, &photons);
+    let (least, most) = (found.iter().min(), found.iter().max());
+    println!("{least:?} to {most:?} photons a visible point");
+    assert!(
+        least >= Some(&1) && most > Some(&1000),
+        "{least:?} to {most:?} photons a visible point"
+    );
+}
+
+/// A closed room that absorbs nothing: each path leaves as many photons as it may have bounces, forty times more than a lane
+/// is given room for, and no buffer may be larger than a hundredth of them.
+#[test]
+fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing() {
+    const DEPTH: u32 = 800;
+    const PATHS: u32 = 256;
+    let mut model = Model::new();
+    let white = model.matte([1.0; 3], 1.0);
+    model.room(white, Vec3::NEG_ONE, Vec3::ONE);
+    model.camera(Vec3::Z * 0.5, Vec3::ZERO, 1.0);
+    let scene = model.scene();
+    let config = RenderConfig {
+        direct: Direct::Photons,
+        radius: Some(0.2),
+        max_depth: DEPTH,
+        ..square(16, PATHS)
+    };
+    let mut free = render(&scene, 0, 2, config.clone());
+    let bytes = u64::from(PATHS * DEPTH) * size_of::<Photon>() as u64 / 100;
+    let mut tight = render_within(Some(bytes), &scene, 0, 2, config);
+    for (what, rendered) in [("free", &free), ("tight", &tight)] {
+        let counters = rendered.counters;
+        println!(
+            "{what}: {} batches, {counters:?}",
+            rendered.renderer.sizes().batches(PATHS)
+        );
+        assert!(
+            counters.repeated_iterations > 0,
+            "{what}: the buffers were never too small"
+        );
+        assert_eq!(counters.photons_stored, u64::from(2 * PATHS * DEPTH), "{what}");
+        assert_eq!(counters.truncated_paths, u64::from(2 * PATHS), "{what}");
+    }
+    assert!(
+        tight.renderer.sizes().batches(PATHS) > 50,
+        "{:?}",
+        tight.renderer.sizes()
+    );
+    let [expected, found] = [&mut free, &mut tight].map(|r| r.download::<Statistics>(BufferId::StatisticsOf));
+    for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        assert_eq!(
+            found.accepted_low, expected.accepted_low,
+            "slot {slot}: photons accepted"
+        );
+        // Sums of f32 in another order.
+        let off = f64::from(found.flux_high[0]) / f64::from(expected.flux_high[0]).max(1e-30) - 1.0;
+        assert!(
+            expected.accepted_low == 0 || off.abs() < 1e-5,
+            "slot {slot}: τ off by {off:e}"
+        );
+    }
+}

@@ -1,0 +1,265 @@
+//! Glass and mirrors where they are hardest: from inside, at the critical angle, against each other, without end.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+use ppm_vk::backend::Backend;
+use ppm_vk::config::{Direct, Estimator, RenderConfig};
+use ppm_vk::cpu;
+use ppm_vk::layout::{NO_OBJECT, Settings, VisiblePoint};
+use ppm_vk::metrics::mean;
+use ppm_vk::scene::Scene;
+use ppm_vk::stage::BufferId;
+
+use super::bench::{object, xyz};
+use super::model::Model;
+use super::sound::{render, square};
+
+const IOR: f32 = 1.5;
+
+/// A room, 2 wide, whose walls shine with 1 and reflect nothing: what doesn't absorb is invisible in it.
+fn shining_room() -> Model {
+    let mut model = Model::new();
+    let walls = model.black(1.0);
+    model.room(walls, Vec3::NEG_ONE, Vec3::ONE);
+    model
+}
+
+/// Directions of the rays through the pixels' centres, as far as f64 can tell, by pixel.
+fn direction(settings: &Settings, x: f64, y: f64) -> DVec3 {
+    let film = |at: f64, side: u32| at / f64::from(side) * 2.0 - 1.0;
+    let [width, height] = settings.resolution;
+    (xyz(settings.camera_forward) + film(x, width) * xyz(settings.camera_right)
+        - film(y, height) * xyz(settings.camera_up))
+    .normalize()
+}
+
+/// Radiance over n² stays the same at a boundary, so that inside of glass it is n² times that outside. A ray in a box
+/// keeps the sizes of its direction's components: where all of them are below the cosine of the critical angle it is
+/// reflected for ever. Such light was never there; the renderer follows those paths to their bounce limit and says so.
+#[test]
+fn a_camera_inside_a_glass_box_sees_n_squared_times_the_light_outside_or_total_reflection_without_end() {
+    let mut model = shining_room();
+    let glass = model.glass(IOR);
+    model.block(glass, Vec3::splat(-0.5), Vec3::splat(0.5));
+    model.camera(Vec3::new(0.05, 0.03, 0.1), Vec3::new(0.4, 0.3, 0.5), 1.8);
+    let iterations = 4;
+    let config = square(64, 1000);
+    let max_depth = config.max_depth;
+    let mut rendered = render(&model.scene(), 0, iterations, config);
+    let settings: Settings = rendered.download::<Settings>(BufferId::Settings)[0];
+    let critical = (1.0 - f64::from(IOR).powi(-2)).sqrt();
+    let (mut free, mut trapped) = (0, 0);
+    for (index, pixel) in rendered.image.pixels().iter().enumerate() {
+        let (x, y) = ((index % 64) as f64, (index / 64) as f64);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        let steepest = corners.map(|(dx, dy)| direction(&settings, x + dx, y + dy).abs().max_element());
+        let expected = if steepest.iter().all(|cosine| *cosine > critical + 0.02) {
+            free += 1;
+            IOR * IOR
+        } else if steepest.iter().all(|cosine| *cosine < critical - 1e-3) {
+            trapped += 1;
+            0.0
+        } else {
+            continue;
+        };
+        assert!(
+            (pixel[0] - expected).abs() < 1e-4,
+            "pixel {x}, {y}: {pixel:?}, {expected} expected"
+        );
+    }
+    println!("{free} pixels see out, {trapped} don't");
+    assert!(free > 1000 && trapped > 200, "{free} pixels see out, {trapped} don't");
+    let truncated = rendered.counters.truncated_paths;
+    assert!(
+        truncated >= trapped * u64::from(iterations),
+        "{truncated} paths are said to be cut"
+    );
+    let warnings = rendered.counters.warnings(rendered.renderer.emitted(), max_depth);
+    assert!(
+        warnings.iter().any(|warning| warning.contains("--max-depth")),
+        "{warnings:?}"
+    );
+}
+
+/// A small lamp in the middle of a glass ball: what the ball reflects comes back to the lamp, which absorbs it as the
+/// walls do. So each path ends once, and takes its whole flux with it.
+#[test]
+fn all_light_of_a_lamp_inside_a_glass_ball_arrives() {
+    let mut model = Model::new();
+    let walls = model.black(0.0);
+    model.room(walls, Vec3::NEG_ONE, Vec3::ONE);
+    let lamp = model.black(100.0);
+    model.sphere(lamp, Vec3::ZERO, 0.01, false);
+    let glass = model.glass(IOR);
+    model.sphere(glass, Vec3::ZERO, 0.4, true);
+    model.camera(Vec3::Z * 0.9, Vec3::ZERO, 1.0);
+    let scene = model.scene();
+    let lamp = 6;
+    let config = RenderConfig {
+        direct: Direct::Photons,
+        radius: Some(0.05),
+        ..square(16, 20_000)
+    };
+    let paths = config.photons;
+    let mut rendered = render(&scene, 0, 1, config);
+    let photons = rendered.photons();
+    assert_eq!(photons.len(), paths as usize, "photons, one a path");
+    let flux = |photons: &mut dyn Iterator<Item = f64>| photons.sum::<f64>() / f64::from(paths);
+    let arrived = flux(&mut photons.iter().map(|photon| photon.flux_direction[0].into()));
+    let emitted = PI * 100.0 * scene.object_area(lamp);
+    assert!((arrived / emitted - 1.0).abs() < 1e-5, "{arrived} of {emitted} arrives");
+    // Straight through the boundary 4 % is reflected, nearly all of it back to the lamp: a binomial number, and 5 of its
+    // standard deviations.
+    let back = photons
+        .iter()
+        .filter(|photon| object(photon.position_object) == Some(lamp))
+        .count();
+    let (expected, paths) = (0.04, f64::from(paths));
+    let deviation = (expected * (1.0 - expected) / paths).sqrt();
+    let back = back as f64 / paths;
+    println!("{back} of the light comes back to the lamp, {expected} ± {deviation:.1e} expected");
+    assert!(
+        back < expected + 5.0 * deviation,
+        "{back} of the light comes back to the lamp"
+    );
+    assert!(back > 0.9 * expected, "{back} of the light comes back to the lamp");
+}
+
+/// Fresnel's reflectance for unpolarised light from inside of glass, by sin² of the angle outside.
+fn reflectance(sin2_t: f64) -> f64 {
+    if sin2_t >= 1.0 {
+        return 1.0;
+    }
+    let n = f64::from(IOR);
+    let (cos_i, cos_t) = ((1.0 - sin2_t / (n * n)).sqrt(), (1.0 - sin2_t).sqrt());
+    let perpendicular = (n * cos_i - cos_t) / (n * cos_i + cos_t);
+    let parallel = (cos_i - n * cos_t) / (cos_i + n * cos_t);
+    0.5 * (perpendicular * perpendicular + parallel * parallel)
+}
+
+/// Next to the critical angle reflectance has an infinite slope, so that the device's must be that of a sin² as near as
+/// f32 can have it: 2.25 · (1 − cos²) of a cosine that is 3 roundings off.
+#[test]
+fn reflectance_at_the_critical_angle_is_fresnels_to_within_rounding_of_the_angle() {
+    const ROUNDING: f64 = 1e-6;
+    let critical = (1.0 / IOR).asin();
+    for (fov, least_of_each) in [(1e-4, 400), (0.1, 1000)] {
+        let mut model = Model::new();
+        let walls = model.matte([1.0; 3], 1.0);
+        model.room(walls, Vec3::NEG_ONE, Vec3::ONE);
+        let glass = model.glass(IOR);
+        model.quad(glass, Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0);
+        // On the quad's back: inside.
+        model.camera(Vec3::Z * -0.5, Vec3::X * (0.5 * critical.tan()), fov);
+        let config = RenderConfig {
+            estimator: Estimator::Ppm,
+            ..square(64, 1000)
+        };
+        let mut rendered = render(&model.scene(), 0, 1, config);
+        let settings: Settings = rendered.download::<Settings>(BufferId::Settings)[0];
+        let points: Vec<VisiblePoint> = rendered.download(BufferId::VisiblePoints);
+        let (mut total, mut partial) = (0, 0);
+        for (pixel_slot, points) in (0..).zip(points.chunks(settings.slots_per_pixel as usize)) {
+            let [x, y] = cpu::pixel_of(settings.resolution, pixel_slot)
+                .expect("whole tiles")
+                .map(f64::from);
+            let cos_i = direction(&settings, x + 0.5, y + 0.5).z;
+            let sin2_t = f64::from(IOR * IOR) * (1.0 - cos_i * cos_i);
+            let throughput = |point: &VisiblePoint| f64::from(point.weight_normal[0]) * PI;
+            let seen = points
+                .iter()
+                .filter(|point| point.position_object[3].to_bits() != NO_OBJECT)
+                .count();
+            let found = if seen == 2 {
+                partial += 1;
+                // The refracted ray's radiance counts n² times inside.
+                let refracted = throughput(&points[0]) / f64::from(IOR * IOR);
+                let reflected = throughput(&points[1]);
+                assert!((refracted + reflected - 1.0).abs() < 1e-6, "{refracted} + {reflected}");
+                reflected
+            } else {
+                total += 1;
+                assert_eq!(seen, 1, "pixel {x}, {y}: visible points");
+                throughput(&points[0])
+            };
+            let (low, high) = (reflectance(sin2_t - ROUNDING), reflectance(sin2_t + ROUNDING));
+            assert!(
+                low - 1e-6 <= found && found <= high + 1e-6,
+                "pixel {x}, {y}, sin² {sin2_t}: reflectance {found}, {low} to {high} expected"
+            );
+        }
+        println!("{partial} pixels below the critical angle, {total} above");
+        assert!(
+            partial >= least_of_each && total >= least_of_each,
+            "{partial} below, {total} above"
+        );
+    }
+}
+
+/// Two blocks of glass side by side, seen from an angle.
+fn two_blocks(iors: [f32; 2], gap: f32) -> Scene {
+    let mut model = shining_room();
+    let [left, right] = iors.map(|ior| model.glass(ior));
+    model.block(left, Vec3::new(-0.5, -0.4, -0.4), Vec3::new(0.0, 0.4, 0.4));
+    model.block(right, Vec3::new(gap, -0.4, -0.4), Vec3::new(0.5, 0.4, 0.4));
+    model.camera(Vec3::new(-0.9, 0.3, 0.6), Vec3::ZERO, 0.6);
+    model.scene()
+}
+
+/// The blocks' faces may be as near to each other as a few of the steps by which rays leave a surface. Where they coincide,
+/// a ray leaves one block past the other's face: what is seen through both is wrong, but nothing is NaN or negative.
+#[test]
+fn glass_beside_glass_of_any_index_is_invisible_in_uniform_light_down_to_a_gap_of_1e_minus_5() {
+    for iors in [[1.5, 1.5], [1.5, 1.2], [1.2, 2.0]] {
+        for gap in [1e-3, 1e-5] {
+            let rendered = render(&two_blocks(iors, gap), 0, 2, square(48, 1000));
+            for (index, pixel) in rendered.image.pixels().iter().enumerate() {
+                let (x, y) = (index % 48, index / 48);
+                assert!(
+                    (pixel[0] - 1.0).abs() < 1e-4,
+                    "{iors:?}, gap {gap}, pixel {x}, {y}: {pixel:?}"
+                );
+            }
+        }
+        let touching = render(&two_blocks(iors, 0.0), 0, 2, square(48, 1000)).image;
+        println!("{iors:?}, no gap: mean {:?} instead of 1", mean(&touching));
+    }
+}
+
+/// A room of mirrors that reflect all: a path ends at the lamp or at the bounce limit. Whatever reaches neither the picture
+/// nor the lamp is counted.
+#[test]
+fn paths_in_a_room_of_mirrors_end_at_the_lamp_or_are_counted() {
+    let mut model = Model::new();
+    let mirror = model.mirror();
+    model.room(mirror, Vec3::NEG_ONE, Vec3::ONE);
+    let lamp = model.black(2.0);
+    model.sphere(lamp, Vec3::new(0.3, -0.2, 0.1), 0.1, false);
+    model.camera(Vec3::new(-0.5, 0.4, 0.7), Vec3::ZERO, 1.0);
+    let config = RenderConfig {
+        direct: Direct::Photons,
+        radius: Some(0.05),
+        estimator: Estimator::Ppm,
+        ..square(32, 5000)
+    };
+    let (paths, max_depth) = (u64::from(config.photons), config.max_depth);
+    let rendered = render(&model.scene(), 0, 1, config);
+    let pixels = rendered.image.pixels();
+    let seen = |radiance: f32| pixels.iter().filter(|pixel| (pixel[0] - radiance).abs() < 1e-5).count() as u64;
+    let (lit, dark) = (seen(2.0), seen(0.0));
+    let counters = rendered.counters;
+    println!("{lit} pixels see the lamp, {dark} don't; {counters:?}");
+    assert_eq!(lit + dark, 32 * 32, "pixels have the lamp's radiance or none");
+    assert!(dark > 100 && lit > 100, "{dark} dark, {lit} lit pixels");
+    assert_eq!(counters.truncated_paths, dark + (paths - counters.photons_stored));
+    let warnings = counters.warnings(rendered.renderer.emitted(), max_depth);
+    let expected = format!(
+        "{} camera and photon paths reached --max-depth 64",
+        counters.truncated_paths
+    );
+    assert!(
+        warnings.len() == 1 && warnings[0].starts_with(&expected),
+        "{warnings:?}"
+    );
+}
