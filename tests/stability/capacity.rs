@@ -1,5 +1,6 @@
 //! Grids that would have more cells than memory, radii of every size, photons that don't fit.
 
+use bytemuck::Zeroable;
 use glam::Vec3;
 use ppm_vk::config::{Direct, Probe, RenderConfig};
 use ppm_vk::cpu;
@@ -19,7 +20,7 @@ fn assert_gathers_agree(
     statistics: &[Statistics],
     photons: &[Photon],
 ) -> Vec<u32> {
-    let mut expected = vec![Gathered { flux_count: [0.0; 4] }; points.len()];
+    let mut expected = vec![Gathered::zeroed(); points.len()];
     cpu::gather_naive(points, statistics, photons, &mut expected);
     bench.upload(BufferId::VisiblePoints, points);
     bench.upload(BufferId::StatisticsOf, statistics);

@@ -1,5 +1,6 @@
 //! Equations 2 and 3 over very many iterations and photons, and at the ends of α's range.
 
+use bytemuck::Zeroable;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
@@ -31,10 +32,7 @@ fn bench(alpha: f32) -> Bench {
     let points: Vec<VisiblePoint> = (0..SLOTS).map(|slot| visible_point([0.0; 3], slot)).collect();
     bench.upload(BufferId::VisiblePoints, &points);
     bench.upload(BufferId::StatisticsOf, &[cpu::reset(RADIUS2); SLOTS as usize]);
-    bench.upload(
-        BufferId::GatheredOf,
-        &[Gathered { flux_count: [0.0; 4] }; SLOTS as usize],
-    );
+    bench.upload(BufferId::GatheredOf, &[Gathered::zeroed(); SLOTS as usize]);
     bench
 }
 
@@ -159,6 +157,7 @@ fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
             FLUX[2] * EACH as f32,
             f32::from_bits(EACH),
         ],
+        ..Gathered::zeroed()
     };
     let mut update = Recording::new();
     update.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS));
