@@ -1,0 +1,78 @@
+//! Loading scenes and rendering pictures of them.
+
+use std::path::{Path, PathBuf};
+
+use ppm_vk::backend::Backend;
+use ppm_vk::config::RenderConfig;
+use ppm_vk::film::{Image, read_exr};
+use ppm_vk::gpu::Device;
+use ppm_vk::metrics::{Defects, defects};
+use ppm_vk::pipeline::Renderer;
+use ppm_vk::scene::{PackedScene, Scene};
+
+pub fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Whether tests that take minutes are wanted as well.
+pub fn long() -> bool {
+    std::env::var_os("PPM_VK_LONG").is_some()
+}
+
+/// The picture in `tests/references` that another renderer made of the scene of this name.
+pub fn reference(name: &str) -> Image {
+    read_exr(&folder().join("tests/references").join(name).with_extension("exr")).expect("reference")
+}
+
+/// A square picture.
+pub fn small(side: u32, photons: u32) -> RenderConfig {
+    RenderConfig {
+        resolution: [side, side],
+        photons,
+        ..RenderConfig::default()
+    }
+}
+
+/// A scene that can be rendered.
+pub struct Subject {
+    pub scene: Scene,
+    pub packed: PackedScene,
+}
+
+impl Subject {
+    /// The file of that name in `scenes/`.
+    pub fn named(name: &str) -> Self {
+        Self::at(&folder().join("scenes").join(name).with_extension("gltf"))
+    }
+
+    pub fn at(path: &Path) -> Self {
+        let scene = Scene::load(path).unwrap_or_else(|error| panic!("{error}"));
+        let packed = PackedScene::new(&scene).expect("hierarchy");
+        Self { scene, packed }
+    }
+
+    pub fn renderer(&self, config: RenderConfig) -> Renderer {
+        let device = Device::open(None).expect("a Vulkan device");
+        Renderer::new(device, &self.packed, &self.scene.cameras[0], config).expect("renderer")
+    }
+
+    /// A picture without NaN, infinity or negative value, of which no path was cut.
+    pub fn render(&self, iterations: u32, config: RenderConfig) -> Image {
+        let mut renderer = self.renderer(config);
+        for _ in 0..iterations {
+            renderer.iterate().expect("iteration");
+        }
+        self.clean_picture(&mut renderer)
+    }
+
+    /// The picture so far, of which the same holds.
+    pub fn clean_picture(&self, renderer: &mut Renderer) -> Image {
+        let name = &self.scene.name;
+        let image = renderer.resolve().expect("picture");
+        let counters = renderer.counters();
+        assert_eq!(counters.non_finite, 0, "{name}: NaN or infinity in a stage");
+        assert_eq!(counters.cut_paths, 0, "{name}: paths cut by the driver's loop limit");
+        assert_eq!(defects(&image), Defects::default(), "{name}");
+        image
+    }
+}

@@ -1,0 +1,30 @@
+//! Answers that are known without this program: closed forms, conservation, theory, other renderers' pictures.
+//!
+//! A tolerance is made of two parts. The statistical one is a number of standard errors, each measured in the test itself
+//! from independent samples, so many that a right program fails a comparison with a probability of 1e-8 or less. The
+//! other bounds the known bias by the photons' radius, from the geometry; each test says how. Seeds are fixed.
+
+#[path = "right/convergence.rs"]
+mod convergence;
+#[path = "../examples/make_scenes/scenes/document.rs"]
+#[expect(dead_code, reason = "the generator of scenes/ needs more of it")]
+mod document;
+#[path = "right/energy.rs"]
+mod energy;
+#[path = "right/furnace.rs"]
+mod furnace;
+#[path = "right/glass.rs"]
+mod glass;
+#[path = "right/lamp.rs"]
+mod lamp;
+#[path = "right/measure.rs"]
+mod measure;
+#[path = "../examples/make_scenes/scenes/mesh.rs"]
+#[expect(dead_code, reason = "the generator of scenes/ needs more of it")]
+mod mesh;
+#[path = "picture/mod.rs"]
+mod picture;
+#[path = "right/references.rs"]
+mod references;
+#[path = "right/stage.rs"]
+mod stage;

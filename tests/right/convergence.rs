@@ -1,0 +1,205 @@
+//! How fast errors fall, against the theory of progressive photon mapping: Knaus and Zwicker, «Progressive Photon Mapping: A
+//! Probabilistic Approach», 2011, and Kaplanyan and Dachsbacher, «Adaptive Progressive Photon Mapping», 2013.
+//!
+//! R² falls as n^(α−1). An iteration's noise variance is in proportion to 1 / R², so the mean of n of them has n^−α. The
+//! bias is in proportion to R² where irradiance is smooth; squared, it falls as n^(−2(1−α)). At an edge it is of the
+//! size of the step within R whatever R is: the mean of its square falls as R, as n^(−(1−α)/2).
+
+use ppm_vk::backend::Backend;
+use ppm_vk::config::{Direct, RenderConfig};
+use ppm_vk::film::Image;
+use ppm_vk::metrics::REL_MSE_FLOOR;
+
+use crate::picture::{Subject, long, reference, small};
+use crate::references::{dim_pixels, error_of_reference};
+
+/// Squares of a picture along each side; their errors are all but independent of each other.
+const ALONG: usize = 4;
+const SQUARES: usize = ALONG * ALONG;
+/// What the magnitude of Student's t with 15 degrees of freedom exceeds with a probability of 1e-8.
+const STUDENT: f64 = 11.28;
+
+/// Squared errors relative to the reference after a number of iterations, summed over each of the squares.
+struct Errors {
+    iterations: u32,
+    noise: [f64; SQUARES],
+    squared_bias: [f64; SQUARES],
+}
+
+/// Sums of the pictures that single iterations make, those of even number and those of odd number apart.
+struct Halves {
+    sums: [Vec<f64>; 2],
+    before: Vec<f64>,
+}
+
+impl Halves {
+    fn new(samples: usize) -> Self {
+        Self {
+            sums: [vec![0.0; samples], vec![0.0; samples]],
+            before: vec![0.0; samples],
+        }
+    }
+
+    /// Takes the picture after one iteration more. It is the mean of the iterations' own: eq. 3 scales τ as eq. 2 does R².
+    fn add(&mut self, iterations: u32, picture: &Image) {
+        let half = &mut self.sums[iterations as usize % 2];
+        let samples = picture.pixels().as_flattened().iter();
+        for ((&value, before), sum) in samples.zip(&mut self.before).zip(half) {
+            let cumulative = f64::from(value) * f64::from(iterations);
+            *sum += cumulative - *before;
+            *before = cumulative;
+        }
+    }
+
+    /// Both halves have the same bias and independent noise: half their difference is the noise of their mean, and the
+    /// product of their errors is the squared bias but for noise of either sign. Their sum is the squared error.
+    fn errors(&self, iterations: u32, reference: &Image, dim: &[bool]) -> Errors {
+        let references = reference.pixels().as_flattened();
+        let count = 3.0 * dim.iter().filter(|dim| **dim).count() as f64;
+        let mean = references.iter().map(|&value| f64::from(value)).sum::<f64>() / references.len() as f64;
+        let half = f64::from(iterations) / 2.0;
+        let mut errors = Errors {
+            iterations,
+            noise: [0.0; SQUARES],
+            squared_bias: [0.0; SQUARES],
+        };
+        for (sample, &reference) in references.iter().enumerate() {
+            let (pixel, side) = (sample / 3, dim.len().isqrt());
+            if !dim[pixel] {
+                continue;
+            }
+            let square = pixel / side * ALONG / side * ALONG + pixel % side * ALONG / side;
+            let reference = f64::from(reference);
+            let [even, odd] = [0, 1].map(|half_number| self.sums[half_number][sample] / half - reference);
+            let weight = 1.0 / (reference * reference + REL_MSE_FLOOR * mean * mean) / count;
+            errors.noise[square] += weight * (0.5 * (even - odd)).powi(2);
+            errors.squared_bias[square] += weight * even * odd;
+        }
+        errors
+    }
+}
+
+/// Errors after 16, 32, 64, … iterations, of the pixels that don't see the lamp: its edges are no matter of photons.
+fn errors(name: &str, config: RenderConfig, iterations: u32) -> Vec<Errors> {
+    let (subject, reference) = (Subject::named(name), reference(name));
+    let dim = dim_pixels(&reference, reference.width());
+    let mut renderer = subject.renderer(config);
+    let mut halves = Halves::new(reference.pixels().len() * 3);
+    let mut found = Vec::new();
+    for iteration in 1..=iterations {
+        renderer.iterate().expect("iteration");
+        halves.add(iteration, &subject.clean_picture(&mut renderer));
+        if iteration.is_power_of_two() && iteration >= 16 {
+            found.push(halves.errors(iteration, &reference, &dim));
+        }
+    }
+    found
+}
+
+/// Slope of the line through the points, in logarithms, by least squares.
+fn log_slope(points: impl Iterator<Item = (u32, f64)>) -> f64 {
+    let logs: Vec<[f64; 2]> = points.map(|(n, error)| [f64::from(n).ln(), error.ln()]).collect();
+    let mean = |axis: usize| logs.iter().map(|log| log[axis]).sum::<f64>() / logs.len() as f64;
+    let (mean_x, mean_y) = (mean(0), mean(1));
+    let covariance: f64 = logs.iter().map(|[x, y]| (x - mean_x) * (y - mean_y)).sum();
+    covariance / logs.iter().map(|[x, _]| (x - mean_x).powi(2)).sum::<f64>()
+}
+
+/// A slope and how far chance may move it.
+#[derive(Clone, Copy)]
+struct Slope {
+    value: f64,
+    chance: f64,
+}
+
+impl Slope {
+    /// Of the sum over the squares, with its deviation by the jackknife: what leaving out each of them changes.
+    fn of(errors: &[Errors], part: impl Fn(&Errors, usize) -> f64) -> Self {
+        let without = |left_out: usize| {
+            let squares = move || (0..SQUARES).filter(move |&square| square != left_out);
+            log_slope(
+                errors
+                    .iter()
+                    .map(|error| (error.iterations, squares().map(|square| part(error, square)).sum())),
+            )
+        };
+        let parts: Vec<f64> = (0..SQUARES).map(without).collect();
+        let mean = parts.iter().sum::<f64>() / SQUARES as f64;
+        let squares: f64 = parts.iter().map(|slope| (slope - mean).powi(2)).sum();
+        Self {
+            value: without(SQUARES),
+            chance: STUDENT * (squares * (SQUARES - 1) as f64 / SQUARES as f64).sqrt(),
+        }
+    }
+
+    #[track_caller]
+    fn assert_between(&self, low: f64, high: f64, what: &str) {
+        let text = format!(
+            "{what}: slope {:.3} ± {:.3} (chance), from {low:.3} to {high:.3} expected",
+            self.value, self.chance
+        );
+        println!("{text}");
+        assert!(
+            self.value > low - self.chance && self.value < high + self.chance,
+            "{text}"
+        );
+    }
+}
+
+/// Slope of the noise by eq. 2, where a point's photons have the same density in each iteration: M in proportion to R².
+fn noise_slope(alpha: f64, iterations: impl Iterator<Item = u32>) -> f64 {
+    let noise_after = |count: u32| {
+        let (mut radius2, mut n, mut sum) = (1.0, 0.0, 0.0);
+        for _ in 0..count {
+            sum += 1.0 / radius2;
+            let m = radius2;
+            radius2 *= (n + alpha * m) / (n + m);
+            n += alpha * m;
+        }
+        sum / f64::from(count).powi(2)
+    };
+    log_slope(iterations.map(|count| (count, noise_after(count))))
+}
+
+/// With photons for all light and random numbers that are independent in each iteration. The initial radius is smaller than the
+/// automatic one, so that there is more noise than bias.
+#[test]
+fn the_error_falls_as_theory_says() {
+    if !long() {
+        return;
+    }
+    let alpha = 2.0 / 3.0;
+    for name in ["cornell", "cornell-spheres"] {
+        let config = RenderConfig {
+            direct: Direct::Photons,
+            radius: Some(0.015),
+            ..small(256, 100_000)
+        };
+        let errors = errors(name, config, 1024);
+        let own_error = error_of_reference(name, 1).powi(2) / SQUARES as f64;
+        let squared_bias = |errors: &Errors, square: usize| errors.squared_bias[square] - own_error;
+        for error in &errors {
+            let sum = |part: &dyn Fn(usize) -> f64| (0..SQUARES).map(part).sum::<f64>();
+            let (noise, bias) = (
+                sum(&|square| error.noise[square]),
+                sum(&|square| squared_bias(error, square)),
+            );
+            println!(
+                "{name}, {} iterations: noise {noise:.3e}, squared bias {bias:.3e}",
+                error.iterations
+            );
+        }
+        let expected = noise_slope(alpha, errors.iter().map(|error| error.iterations));
+        let noise = Slope::of(&errors, |error, square| error.noise[square]);
+        noise.assert_between(expected, expected, &format!("{name}, noise"));
+        let total = Slope::of(&errors, |error, square| {
+            error.noise[square] + squared_bias(error, square)
+        });
+        assert!(
+            (total.value + alpha).abs() < 0.08,
+            "{name}: relMSE falls with iterations to the power {:.3}",
+            total.value
+        );
+        println!("{name}, relMSE: slope {:.3}", total.value);
+    }
+}

@@ -1,0 +1,147 @@
+//! Scenes made for a test, and what their cameras see.
+
+use std::f64::consts::PI;
+use std::fs;
+
+use glam::{DVec3, dvec3};
+use ppm_vk::backend::settings;
+use ppm_vk::config::RenderConfig;
+use ppm_vk::cpu::{self, Counts, Inputs};
+use ppm_vk::layout::NO_OBJECT;
+use tempfile::TempDir;
+
+use crate::document::Document;
+use crate::mesh::Mesh;
+use crate::picture::Subject;
+
+/// Loads a document.
+pub fn subject(document: Document) -> Subject {
+    let folder = TempDir::new().expect("a temporary folder");
+    let [file, buffer] = document.finish();
+    for file in [&file, &buffer] {
+        fs::write(folder.path().join(&file.name), &file.bytes).expect("a file in the temporary folder");
+    }
+    let subject = Subject::at(&folder.path().join(&file.name));
+    assert_eq!(subject.scene.warnings, [""; 0], "{}", file.name);
+    subject
+}
+
+/// The mesh with the normals of its facets: light then goes exactly as geometry says, and as much of it everywhere.
+pub fn faceted(mesh: &Mesh) -> Mesh {
+    let mut facets = Mesh::default();
+    for triangle in &mesh.triangles {
+        let corners = triangle.map(|corner| mesh.positions[usize::from(corner)]);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+        let first = facets.positions.len() as u16;
+        facets.positions.extend(corners);
+        facets.normals.extend([normal; 3]);
+        facets.triangles.push([first, first + 1, first + 2]);
+    }
+    facets
+}
+
+/// Walls of a square room that is closed to all sides but up and down, facing inward.
+pub fn walls(half_side: f64, bottom: f64, top: f64) -> [Mesh; 4] {
+    let h = half_side;
+    [[-h, -h, h, -h], [-h, h, -h, -h], [h, -h, h, h], [h, h, -h, h]].map(|[x0, z0, x1, z1]| {
+        Mesh::quad([
+            dvec3(x0, bottom, z0),
+            dvec3(x1, bottom, z1),
+            dvec3(x1, top, z1),
+            dvec3(x0, top, z0),
+        ])
+    })
+}
+
+/// Origin and unit direction, in the scene's units, of the ray through a point of the picture: from the upper left corner,
+/// in pixels of a square picture.
+pub fn camera_ray(subject: &Subject, side: usize, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
+    let camera = &subject.scene.cameras[0];
+    let normalisation = subject.scene.normalisation;
+    let film = |at: f64| (2.0 * at / side as f64 - 1.0) * f64::from(camera.tan_half_fov);
+    let direction = camera.forward.as_dvec3() + film(x) * camera.right.as_dvec3() - film(y) * camera.up.as_dvec3();
+    let origin = camera.position.as_dvec3() / normalisation.scale + normalisation.centre;
+    (origin, direction.normalize())
+}
+
+/// Mean over a pixel of a function of the point that is seen of the plane y = 0.
+pub fn mean_on_floor(subject: &Subject, side: usize, [column, row]: [usize; 2], value: impl Fn(DVec3) -> f64) -> f64 {
+    let places = [0.125, 0.375, 0.625, 0.875];
+    let at = |x: f64, y: f64| {
+        let (origin, direction) = camera_ray(subject, side, [column as f64 + x, row as f64 + y]);
+        value(origin - direction * (origin.y / direction.y))
+    };
+    places
+        .iter()
+        .map(|&x| places.iter().map(|&y| at(x, y)).sum::<f64>())
+        .sum::<f64>()
+        / 16.0
+}
+
+/// Mean over a horizontal disc.
+pub fn mean_over_disc(value: impl Fn(DVec3) -> f64, centre: DVec3, radius: f64) -> f64 {
+    const RINGS: u32 = 8;
+    const SPOKES: u32 = 12;
+    let mut sum = 0.0;
+    for ring in 0..RINGS {
+        let r = radius * ((f64::from(ring) + 0.5) / f64::from(RINGS)).sqrt();
+        for spoke in 0..SPOKES {
+            let (sin, cos) = (2.0 * PI * f64::from(spoke) / f64::from(SPOKES)).sin_cos();
+            sum += value(centre + r * dvec3(cos, 0.0, sin));
+        }
+    }
+    sum / f64::from(RINGS * SPOKES)
+}
+
+/// How much of its photons a picture lacks at the most where its radius is the initial one, if all visible points see the
+/// same irradiance: discs around points near the rim of their object reach beyond it. All objects must be rectangles along
+/// the axes; where two rims are near, what both cut off counts twice.
+pub fn lost_at_rims(subject: &Subject, config: &RenderConfig) -> f64 {
+    const ITERATIONS: u32 = 8;
+    let scene = &subject.scene;
+    let bounds: Vec<_> = scene
+        .objects
+        .iter()
+        .map(|object| {
+            let corners = object
+                .triangles
+                .clone()
+                .flat_map(|triangle| scene.triangles[triangle as usize].vertices);
+            let positions = corners.map(|vertex| scene.positions[vertex as usize].as_dvec3());
+            positions.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(p), high.max(p))
+            })
+        })
+        .collect();
+    let settings = settings(config, &subject.packed, &scene.cameras[0], u32::MAX);
+    let inputs = Inputs {
+        scene: &subject.packed,
+        settings: &settings,
+        config,
+    };
+    let radius = f64::from(settings.initial_radius2).sqrt();
+    let mut lost = 0.0;
+    for iteration in 0..ITERATIONS {
+        for point in cpu::camera(&inputs, iteration, &Counts::default()) {
+            let [x, y, z, object] = point.position_object;
+            if object.to_bits() == NO_OBJECT {
+                continue;
+            }
+            let position = dvec3(x.into(), y.into(), z.into());
+            let (low, high) = bounds[object.to_bits() as usize];
+            for axis in 0..3 {
+                if high[axis] - low[axis] > 1e-4 {
+                    lost += cut_off((position[axis] - low[axis]) / radius);
+                    lost += cut_off((high[axis] - position[axis]) / radius);
+                }
+            }
+        }
+    }
+    lost / f64::from(ITERATIONS * config.resolution[0] * config.resolution[1])
+}
+
+/// Share of a disc beyond a line at so many radii from its centre.
+fn cut_off(distance: f64) -> f64 {
+    let t = distance.clamp(-1.0, 1.0);
+    (t.acos() - t * (1.0 - t * t).sqrt()) / PI
+}
