@@ -112,9 +112,9 @@ const FLOOR: [f64; 3] = [0.25, 0.5, 0.75];
 const LAMP: [f64; 3] = [4.0, 2.0, 1.0];
 
 /// A floor with a mirror and a glass sphere under a lamp; with a black sky around it or nothing.
-fn under_the_sky(closed: bool) -> Subject {
+fn under_the_sky(floor: [f64; 3], closed: bool) -> Subject {
     let mut scene = Document::new("under-the-sky");
-    let floor = scene.material(matte("floor", FLOOR));
+    let floor = scene.material(matte("floor", floor));
     let lamp = scene.material(light("lamp", LAMP));
     let mirror = scene.material(mirror("mirror", [1.0; 3]));
     let glass = scene.material(clear("glass", 1.5));
@@ -135,7 +135,7 @@ fn under_the_sky(closed: bool) -> Subject {
 /// What the sky gets is what escapes without it. The floor absorbs 1 − ρ of what it gets, and the lamp all.
 #[test]
 fn what_is_emitted_is_absorbed_or_escapes() {
-    let (open, closed) = (under_the_sky(false), under_the_sky(true));
+    let [open, closed] = [false, true].map(|closed| under_the_sky(FLOOR, closed));
     let object = |name| {
         let object = closed.scene.objects.iter().position(|object| object.name == name);
         object.expect("an object") as u32
@@ -164,6 +164,24 @@ fn what_is_emitted_is_absorbed_or_escapes() {
             assert!(
                 (0.05..0.9).contains(&on_open_floor),
                 "this scene shows little: {on_open_floor} is absorbed"
+            );
+        }
+    }
+}
+
+/// Where all that is matte is black, every path ends with one photon that has all its flux. Not a path may differ.
+#[test]
+fn mirrors_and_glass_neither_gain_nor_lose_flux() {
+    let black = under_the_sky([0.0; 3], true);
+    for (place, lanes) in on_both(&black, &config(Direct::Photons)) {
+        for (channel, radiance) in LAMP.into_iter().enumerate() {
+            let sums = flux(&black, &lanes, channel, |_| 1.0);
+            let expected = PI * radiance;
+            let worst = sums.iter().map(|sum| (sum / expected - 1.0).abs()).fold(0.0, f64::max);
+            println!("{place}, channel {channel}: a lane is off by {worst:.1e} at the most");
+            assert!(
+                worst < 1e-5,
+                "{place}, channel {channel}: the flux of a lane is off by {worst}"
             );
         }
     }

@@ -75,7 +75,8 @@ fn a_floor_under_a_square_light_has_the_irradiance_of_its_view_factor() {
         "{at_the_origin} isn't what scenes/README.md says"
     );
     let scene = Subject::named("light-area");
-    let regions = [[24, 24], [8, 30], [38, 40], [14, 14], [40, 20]].map(|centre| Region::around(centre, 4));
+    let points = [[24, 24], [8, 30], [38, 40], [14, 14], [40, 20]].map(|centre| Region::around(centre, 4));
+    let regions = [&points[..], &[Region::around([24, 26], 18)]].concat();
     for (direct, photons) in [(Direct::Light, 100), (Direct::Photons, 50_000)] {
         let irradiance = |point| 10.0 * irradiance_under_square(point, 0.5, 2.0);
         assert_floor_is_lit_by(
@@ -142,7 +143,7 @@ fn a_mirror_lights_a_floor_as_the_lamps_image_does() {
         "the picture shows the lamp's shadow, at z = {nearest}"
     );
     let irradiance = |point| 10.0 * irradiance_under_square(point, 0.1, 2.0);
-    let regions = [[24, 24], [10, 36], [38, 12]].map(|centre| Region::around(centre, 8));
+    let regions = [([24, 24], 22), ([10, 36], 8), ([38, 12], 8)].map(|(centre, side)| Region::around(centre, side));
     let config = config(Direct::Light, 50_000, 0.15);
     assert_floor_is_lit_by(&scene, &config, ALBEDO, irradiance, &regions, true, 1.0 + ALBEDO);
 }
