@@ -10,7 +10,7 @@ use ppm_vk::gather;
 use ppm_vk::gpu::Device;
 use ppm_vk::metrics::{Defects, compare, defects};
 
-use picture::{Subject, folder, long, reference, small};
+use picture::{Subject, long, reference, small};
 
 fn assert_matches_reference(name: &str, direct: Direct, iterations: u32, rel_mse: f64) {
     let config = RenderConfig {
