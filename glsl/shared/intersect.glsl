@@ -12,13 +12,12 @@ bool loops_left() {
     return loop_count < settings.loop_limit;
 }
 
-// A ray and coordinates in which it is an axis: `across` and `up` vanish along it, `along` is t.
+// A ray and coordinates in which it is an axis: `across` and `up` vanish along it.
 struct Ray {
     vec3 origin;
     vec3 direction;
     vec3 across;
     vec3 up;
-    vec3 along;
 };
 
 Ray ray_frame(vec3 origin, vec3 direction) {
@@ -31,25 +30,22 @@ Ray ray_frame(vec3 origin, vec3 direction) {
         float inverse = 1.0 / direction.x;
         ray.across = vec3(-direction.y * inverse, 1.0, 0.0);
         ray.up = vec3(-direction.z * inverse, 0.0, 1.0);
-        ray.along = vec3(inverse, 0.0, 0.0);
     } else if (size.y >= size.z) {
         float inverse = 1.0 / direction.y;
         ray.across = vec3(1.0, -direction.x * inverse, 0.0);
         ray.up = vec3(0.0, -direction.z * inverse, 1.0);
-        ray.along = vec3(0.0, inverse, 0.0);
     } else {
         float inverse = 1.0 / direction.z;
         ray.across = vec3(1.0, 0.0, -direction.x * inverse);
         ray.up = vec3(0.0, 1.0, -direction.y * inverse);
-        ray.along = vec3(0.0, 0.0, inverse);
     }
     return ray;
 }
 
-// A corner in the ray's coordinates: a function of the corner alone, the same for all triangles that share it.
-vec3 in_frame(Ray ray, vec3 corner) {
+// Where a corner lies beside the ray: a function of the corner alone, the same for all triangles that share it.
+vec2 beside(Ray ray, vec3 corner) {
     precise vec3 from = corner - ray.origin;
-    precise vec3 result = vec3(dot(ray.across, from), dot(ray.up, from), dot(ray.along, from));
+    precise vec2 result = vec2(dot(ray.across, from), dot(ray.up, from));
     return result;
 }
 
@@ -61,20 +57,24 @@ float side_of(vec2 a, vec2 b) {
 }
 
 // Woop, Benthin and Wald, «Watertight Ray/Triangle Intersection», JCGT 2(1), 2013: no ray passes between triangles that
-// share an edge or a corner. Accepts 0 < t < hit.t.
+// share an edge or a corner. The distance is that of the plane: unlike one interpolated from the corners', it is as right
+// for a ray that starts on the triangle as `offset_origin` counts on. Accepts 0 < t < hit.t.
 bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, uint index, inout Hit hit) {
-    vec3 a = in_frame(ray, corner0);
-    vec3 b = in_frame(ray, corner1);
-    vec3 c = in_frame(ray, corner2);
-    vec3 sides = vec3(side_of(b.xy, c.xy), side_of(c.xy, a.xy), side_of(a.xy, b.xy));
+    vec2 a = beside(ray, corner0);
+    vec2 b = beside(ray, corner1);
+    vec2 c = beside(ray, corner2);
+    vec3 sides = vec3(side_of(b, c), side_of(c, a), side_of(a, b));
     if (any(lessThan(sides, vec3(0.0))) && any(greaterThan(sides, vec3(0.0)))) {
         return false;
     }
-    float inverse = 1.0 / (sides.x + sides.y + sides.z);
-    float t = dot(sides, vec3(a.z, b.z, c.z)) * inverse;
-    if (!(t > 0.0 && t < hit.t)) {
+    vec3 n = cross(corner1 - corner0, corner2 - corner0);
+    float t = dot(n, corner0 - ray.origin) / dot(n, ray.direction);
+    float sum = sides.x + sides.y + sides.z;
+    // The sum is 0 of a triangle that the ray sees edge on.
+    if (!(t > 0.0 && t < hit.t && sum != 0.0)) {
         return false;
     }
+    float inverse = 1.0 / sum;
     hit = Hit(t, sides.y * inverse, sides.z * inverse, index);
     return true;
 }
