@@ -37,7 +37,7 @@ def render(arguments, meshes, camera, resolution):
         from . import render as rendering
         from . import scene as scenes
 
-        scene = scenes.build(meshes, camera, resolution)
+        scene = scenes.build(meshes, camera, resolution, is_aimed=arguments.light_tracing)
     except ImportError as error:
         fail(str(error))
     except gltf.Unsupported as error:
@@ -46,17 +46,11 @@ def render(arguments, meshes, camera, resolution):
 
     pixels = np.arange(resolution[0] * resolution[1])
     if arguments.light_tracing:
-        without = scenes.build(meshes, camera, resolution, has_specular=False)
-        is_specular = rendering.sees_specular(scene)
-        groups = rendering.by_noise(scene, pixels[is_specular], without) if is_specular.any() else []
-        parts = [
-            *(
-                rendering.Paths(f"mirrors and glass {number}", scene, group, arguments.spp, without)
-                for number, group in enumerate(groups, 1)
-            ),
-            rendering.Paths("matte surfaces", scene, pixels[~is_specular], arguments.spp, without),
-            rendering.Caustics(scene, without, pixels),
-        ]
+        without = scenes.build(meshes, camera, resolution, has_specular=False, is_aimed=True)
+        groups = rendering.by_noise(scene, pixels, without)
+        parts = [rendering.Caustics(scene, without, pixels)]
+        for number, group in enumerate(groups, 1):
+            parts.append(rendering.Paths(f"pixels {number}", scene, group, arguments.spp, without))
     else:
         parts = [rendering.Paths("pixels", scene, pixels, arguments.spp)]
     estimate = rendering.Estimate(parts)

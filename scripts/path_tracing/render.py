@@ -126,16 +126,6 @@ def meets_specular(scene, ray):
     return si.is_valid() & mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Delta)
 
 
-def sees_specular(scene):
-    """For each pixel, whether one of 16 primary rays meets a mirror or glass: such pixels need more samples."""
-    width, height = scene.sensors()[0].film().size()
-    pixels = np.arange(width * height)
-    lane = dr.arange(mi.UInt32, len(pixels) * 16)
-    offsets = (mi.Point2f(lane % 4, lane // 4 % 4) + 0.5) / 4
-    is_specular = meets_specular(scene, primary_rays(scene, pixels, 16, offsets))
-    return is_specular.numpy().reshape(len(pixels), 16).any(axis=1)
-
-
 def by_noise(scene, pixels, without):
     """The pixels in groups of similar noise, most first, each twice as large as the one before. A few pixels have nearly all
     the noise where mirrors or glass show caustics.
@@ -146,13 +136,13 @@ def by_noise(scene, pixels, without):
     while pilot.spp() < 256:
         pilot.go_on()
     mean = pilot.mean()
-    noise = (pilot.variance_of_mean() / (mean**2 + 0.01 * mean[pixels].mean() ** 2)).mean(axis=1)
+    noise = (pilot.variance_of_mean() / (mean**2 + 0.01 * mean.mean() ** 2)).mean(axis=1)
     # Neighbours are alike, and a pixel's own samples too few.
     width, height = scene.sensors()[0].film().size()
     padded = np.pad(noise.reshape(height, width), 2)
-    noise = sum(padded[y : y + height, x : x + width] for y in range(5) for x in range(5)).ravel()[pixels]
-    ends = [len(pixels) >> halvings for halvings in range(6, 0, -1)]
-    return np.split(pixels[np.argsort(-noise)], ends)
+    noise = sum(padded[y : y + height, x : x + width] for y in range(5) for x in range(5)).ravel()
+    ends = [len(pixels) >> halvings for halvings in range(8, 0, -1)]
+    return np.split(np.argsort(-noise), ends)
 
 
 class Estimate:

@@ -68,28 +68,38 @@ class SchlickMirror(mi.BSDF):
         return f"SchlickMirror[{self.f0}]"
 
 
-class DoubleSidedArea(mi.Emitter):
-    """An area light whose two sides emit. Mitsuba's own emit on the front alone."""
+class Lamp(mi.Emitter):
+    """An area light of uniform radiance that may emit on both sides (Mitsuba's own emit on the front alone), and that may
+    aim half of the rays that start on it at a sphere."""
 
     def __init__(self, props):
         mi.Emitter.__init__(self, props)
         self.radiance = mi.Color3f(props["radiance"])
+        self.double_sided = props["double_sided"]
+        self.is_aimed = props.has_property("radius")
+        if self.is_aimed:
+            self.centre = mi.Point3f(props["centre"])
+            self.radius = props["radius"]
         self.m_flags = +mi.EmitterFlags.Surface
 
+    def emits(self, cosine):
+        return cosine != 0 if self.double_sided else cosine > 0
+
     def eval(self, si, active=True):
-        return dr.select(active, self.radiance, 0)
+        return dr.select(active & self.emits(si.wi.z), self.radiance, 0)
 
     def sample_direction(self, it, sample, active=True):
         ds = self.get_shape().sample_direction(it, sample, active)
         ds.emitter = mi.EmitterPtr(self)
-        is_seen = active & (ds.pdf > 0) & (dr.dot(ds.d, ds.n) != 0)
+        is_seen = active & (ds.pdf > 0) & self.emits(-dr.dot(ds.d, ds.n))
         return ds, dr.select(is_seen, self.radiance / ds.pdf, 0)
 
     def pdf_direction(self, it, ds, active=True):
-        return dr.select(active & (dr.dot(ds.d, ds.n) != 0), self.get_shape().pdf_direction(it, ds, active), 0)
+        is_seen = active & self.emits(-dr.dot(ds.d, ds.n))
+        return dr.select(is_seen, self.get_shape().pdf_direction(it, ds, active), 0)
 
     def eval_direction(self, it, ds, active=True):
-        return dr.select(active, self.radiance, 0)
+        return dr.select(active & self.emits(-dr.dot(ds.d, ds.n)), self.radiance, 0)
 
     def sample_position(self, time, sample, active=True):
         ps = self.get_shape().sample_position(time, sample, active)
@@ -97,26 +107,46 @@ class DoubleSidedArea(mi.Emitter):
 
     def sample_ray(self, time, sample1, sample2, sample3, active=True):
         ps, weight = self.sample_position(time, sample2, active)
-        normal = dr.select(sample1 < 0.5, ps.n, -ps.n)
+        normal = ps.n
+        if self.double_sided:
+            normal = dr.select(sample1 < 0.5, normal, -normal)
+            sample1 = 2 * dr.select(sample1 < 0.5, sample1, sample1 - 0.5)
+            weight *= 2
         direction = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(sample3))
+        if self.is_aimed:
+            axis = self.centre - ps.p
+            sine2 = dr.square(self.radius) / dr.squared_norm(axis)
+            axis = dr.normalize(axis)
+            is_outside = sine2 < 0.99
+            least_cosine = dr.sqrt(1 - dr.select(is_outside, sine2, 0))
+            in_cone = mi.Frame3f(axis).to_world(mi.warp.square_to_uniform_cone(sample3, least_cosine))
+            direction = dr.select(is_outside & (sample1 < 0.5), in_cone, direction)
+            cosine = dr.maximum(dr.dot(direction, normal), 0)
+            hits = dr.dot(direction, axis) >= least_cosine
+            cone_density = dr.select(hits, dr.rcp(2 * dr.pi * (1 - least_cosine)), 0)
+            density = dr.select(is_outside, 0.5 * (cosine / dr.pi + cone_density), cosine / dr.pi)
+            weight *= dr.select(density > 0, cosine / density, 0)
+        else:
+            weight *= dr.pi
         si = mi.SurfaceInteraction3f(ps, [])
-        return si.spawn_ray(direction), self.radiance * (weight * 2 * dr.pi)
+        return si.spawn_ray(direction), self.radiance * weight
 
     def sample_wavelengths(self, si, sample, active=True):
-        return mi.Color0f(), dr.select(active, self.radiance, 0)
+        return mi.Color0f(), dr.select(active & self.emits(si.wi.z), self.radiance, 0)
 
     def to_string(self):
-        return f"DoubleSidedArea[{self.radiance}]"
+        return f"Lamp[{self.radiance}]"
 
 
 mi.register_bsdf("schlick_mirror", SchlickMirror)
-mi.register_emitter("double_sided_area", DoubleSidedArea)
+mi.register_emitter("lamp", Lamp)
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
 
 
-def build(meshes, camera, resolution, has_specular=True):
+def build(meshes, camera, resolution, has_specular=True, is_aimed=False):
     """The scene. Without `has_specular` mirrors and glass are black, so that no light is left that has met any.
+    With `is_aimed` lights send half of their rays where mirrors and glass are.
 
     It is moved and scaled to the cube from -1 to 1 (lengths have no part in what is supported): Mitsuba's f32 is coarse
     far from the origin.
@@ -125,6 +155,8 @@ def build(meshes, camera, resolution, has_specular=True):
     lower, upper = points.min(axis=0), points.max(axis=0)
     centre, scale = (lower + upper) / 2, 2 / (upper - lower).max()
     position = (camera.position - centre) * scale
+    specular = [mesh.positions.reshape(-1, 3) for mesh in meshes if mesh.material.kind != "matte"]
+    aim = bounding_sphere((np.concatenate(specular) - centre) * scale) if is_aimed and specular else {}
     width, height = resolution
     scene = {
         "type": "scene",
@@ -160,13 +192,22 @@ def build(meshes, camera, resolution, has_specular=True):
                 "bsdf": {"type": "twosided", "bsdf": BLACK} if is_black else bsdf(material),
             }
             if max(material.emission) > 0:
-                kind = "double_sided_area" if material.double_sided else "area"
-                radiance = {"type": "rgb", "value": list(material.emission)}
-                if material.double_sided:
-                    radiance = mi.ScalarColor3f(material.emission)
-                scene[f"mesh{number}"]["emitter"] = {"type": kind, "radiance": radiance}
+                scene[f"mesh{number}"]["emitter"] = lamp(material, aim)
         # Optimised, lights that are alike become one, which can't belong to several shapes.
         return mi.load_dict(scene, optimize=False)
+
+
+def bounding_sphere(points):
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    radius = np.linalg.norm(points - centre, axis=1).max()
+    return {"centre": mi.ScalarPoint3f(centre), "radius": float(radius)}
+
+
+def lamp(material, aim):
+    if not material.double_sided and not aim:
+        return {"type": "area", "radiance": {"type": "rgb", "value": list(material.emission)}}
+    radiance = mi.ScalarColor3f(material.emission)
+    return {"type": "lamp", "radiance": radiance, "double_sided": material.double_sided, **aim}
 
 
 def bsdf(material):
