@@ -1,7 +1,9 @@
 //! What the user asked for, and every buffer size and group count that follows from it.
 
 use crate::error::{Error, Result};
-use crate::layout::{DirectSum, Gathered, GridShape, Photon, RadiusSum, Statistics, StatusCounters, VisiblePoint};
+use crate::layout::{
+    Coverage, DirectSum, Gathered, GridShape, Photon, RadiusSum, Statistics, StatusCounters, VisiblePoint,
+};
 use crate::stage::BufferId;
 
 /// Which visible points an iteration uses.
@@ -163,6 +165,12 @@ impl RenderConfig {
         // A sequence has 2³² points.
         let most = 1 << (u32::MAX / self.photons.max(1)).max(1).ilog2();
         iteration / grown.min(most) * grown.min(most)
+    }
+
+    /// Points of the disc around each visible point that `coverage` asks in an iteration: many at first, since what few say
+    /// is worse than nothing.
+    pub fn coverage_points(&self, iteration: u32) -> u32 {
+        16 >> iteration.saturating_add(1).ilog2().min(4)
     }
 
     /// Photon paths of the block before `iteration`.
@@ -370,6 +378,7 @@ impl Sizes {
             BufferId::StatisticsOf => (slots, size_of::<Statistics>()),
             BufferId::GatheredOf => (slots, size_of::<Gathered>()),
             BufferId::DirectSums => (slots, size_of::<DirectSum>()),
+            BufferId::CoverageOf => (slots, size_of::<Coverage>()),
             BufferId::TestsOf => (if self.probe.count_tests { slots } else { 1 }, 4),
             BufferId::RadiusSums => (u64::from(RADIUS_GROUPS), size_of::<RadiusSum>()),
             BufferId::Film => (pixels, 16),

@@ -216,6 +216,14 @@ device_structs! {
         pub low: [f32; 4],
     }
 
+    /// Of the discs around a visible point, how much can have photons, in sixteenths.
+    pub struct Coverage: 8 {
+        /// That can.
+        pub covered: u32,
+        /// In all.
+        pub asked: u32,
+    }
+
     /// Sums over visible points' radii.
     pub struct RadiusSum: 16 {
         /// Σ R².

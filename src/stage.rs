@@ -28,6 +28,8 @@ pub enum BufferId {
     GatheredOf,
     /// [`crate::layout::DirectSum`] of each slot.
     DirectSums,
+    /// [`crate::layout::Coverage`] of each slot.
+    CoverageOf,
     /// [`crate::layout::RadiusSum`] of each share of the slots.
     RadiusSums,
     /// [`crate::layout::Photon`]s as the lanes store them: number-major, `[number][lane]`.

@@ -5,6 +5,8 @@
 mod agreement;
 #[path = "kernels/bench.rs"]
 mod bench;
+#[path = "kernels/coverage.rs"]
+mod coverage;
 #[path = "kernels/gather.rs"]
 mod gather;
 #[path = "kernels/limits.rs"]

@@ -39,6 +39,7 @@ struct Random {
 const uint CAMERA_PATH = 0x63616d65u;
 const uint PHOTON_PATH = 0x70686f74u;
 const uint LIGHT_SAMPLE = 0x6c696768u;
+const uint COVERAGE_SAMPLE = 0x636f7665u;
 
 Random random_for(uint kind, uint path, uint iteration, uint block, uint sequence, uint index, uint seed) {
     uint mixed = seed ^ kind;
@@ -53,6 +54,14 @@ Random random_of_pixel(uint kind, uint pixel, uint iteration, uint block, uint s
 // For a photon path of an iteration that begins at `first` in its sequence.
 Random random_of_photon(uint path, uint iteration, uint block, uint first, uint seed) {
     return random_for(PHOTON_PATH, path, iteration, block, 0u, first + path, seed);
+}
+
+// For one of several samples that a path takes alike.
+Random sample_of(Random random, uint number, uint samples) {
+    Random result = random;
+    result.index = random.index * samples + number;
+    result.dimension = SAMPLER == SOBOL ? 0u : number;
+    return result;
 }
 
 // Uniform in [0, 1): the 24 bits that an f32 in that range can hold.

@@ -34,6 +34,17 @@ struct DirectSum {
     vec4 low;
 };
 
+// Of the discs around a visible point, how much can have photons, in sixteenths.
+struct Coverage {
+    uint covered;
+    uint asked;
+};
+
+// Their share; 1 where nothing is known of it.
+float share_of(Coverage coverage) {
+    return coverage.covered > 0u ? float(coverage.covered) / float(coverage.asked) : 1.0;
+}
+
 // Sums over radii: the grid's cell size follows from them.
 struct RadiusSum {
     float radius2;  // Σ R²

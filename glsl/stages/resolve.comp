@@ -17,6 +17,7 @@ layout(push_constant) uniform Push {
 } push;
 
 layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
+layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
 layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
 layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left
 
@@ -37,7 +38,8 @@ void main() {
         // The quotient of flux and emitted photons comes first: both grow without bound, it doesn't.
         radiance.rgb += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
         if (mine.radius2_high > 0.0) {
-            radiance += (mine.flux_high + mine.flux_low) / push.emitted / (PI * mine.radius2_high);
+            float area = PI * mine.radius2_high * share_of(coverage[slot]);
+            radiance += (mine.flux_high + mine.flux_low) / push.emitted / area;
         }
     }
     if (!finite(radiance.rgb) || isnan(radiance.w) || isinf(radiance.w)) {

@@ -232,6 +232,7 @@ impl GatherBench<'_> {
         let settings: Vec<Settings> = renderer.gpu().download(BufferId::Settings, Some(1))?;
         let statistics: Vec<Statistics> = renderer.gpu().download(BufferId::StatisticsOf, None)?;
         let direct = renderer.gpu().download(BufferId::DirectSums, None)?;
+        let coverage = renderer.gpu().download(BufferId::CoverageOf, None)?;
         let config = RenderConfig {
             resolution,
             ..self.config.clone()
@@ -251,7 +252,8 @@ impl GatherBench<'_> {
         let median_of = |work: &dyn Fn() -> f64| median((0..=self.repeats).map(|_| work()).skip(1).collect());
         steps.raytracing_us[1] = median_of(&|| timed_us(|| cpu::camera(&inputs, 0, &counts)).1);
         steps.photon_tracing_us[1] = median_of(&|| timed_us(|| cpu::compact(&cpu::photons(&inputs, batch, &counts))).1);
-        steps.synthesize_us[1] = median_of(&|| timed_us(|| cpu::resolve(&settings[0], &statistics, &direct, 1, 1)).1);
+        steps.synthesize_us[1] =
+            median_of(&|| timed_us(|| cpu::resolve(&settings[0], &statistics, &direct, &coverage, 1, 1)).1);
         Ok(())
     }
 }

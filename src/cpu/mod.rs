@@ -10,6 +10,7 @@
 //! sum depends on an order.
 
 mod camera;
+mod coverage;
 mod direct;
 mod gather;
 mod intersect;
@@ -29,6 +30,7 @@ mod vector;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 pub use camera::camera;
+pub use coverage::coverage;
 pub use direct::direct;
 pub use gather::{gather_kd_tree, gather_naive};
 pub use intersect::{Hit, Ray, is_blocked, nearest_hit};

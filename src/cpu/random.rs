@@ -12,6 +12,8 @@ pub enum PathKind {
     Photon = 0x7068_6f74,
     /// From a visible point to a light; its number is the slot.
     LightSample = 0x6c69_6768,
+    /// Of points around a visible point; its number is the slot.
+    Coverage = 0x636f_7665,
 }
 
 /// The numbers of one path in one iteration.
@@ -66,6 +68,15 @@ impl Random {
             block,
             index: iteration - block,
             ..Self::with(inputs.config.sampler, kind, pixel, iteration, inputs.settings.seed)
+        }
+    }
+
+    /// The numbers of one of several samples that a path takes alike.
+    pub fn sample_of(&self, number: u32, samples: u32) -> Self {
+        Self {
+            index: self.index.wrapping_mul(samples).wrapping_add(number),
+            dimension: if self.sampler == Sampler::Sobol { 0 } else { number },
+            ..*self
         }
     }
 

@@ -5,14 +5,14 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::{
-    Batch, Counts, Inputs, camera, compact, direct, fit_radius, gather_kd_tree, gather_naive, photons, reset, resolve,
-    update,
+    Batch, Counts, Inputs, camera, compact, coverage, direct, fit_radius, gather_kd_tree, gather_naive, photons, reset,
+    resolve, update,
 };
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Estimator, Limits, RenderConfig, Sizes};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
-use crate::layout::{DirectSum, Gathered, Settings, Statistics, VisiblePoint};
+use crate::layout::{Coverage, DirectSum, Gathered, Settings, Statistics, VisiblePoint};
 use crate::radius;
 use crate::record::{Launch, Run};
 use crate::scene::{Camera, PackedScene};
@@ -33,6 +33,7 @@ pub struct Renderer {
     statistics: Vec<Statistics>,
     gathered: Vec<Gathered>,
     direct_sums: Vec<DirectSum>,
+    coverage: Vec<Coverage>,
     iterations: u32,
     emitted: u64,
     counters: Counters,
@@ -76,6 +77,7 @@ impl Renderer {
             statistics: Vec::new(),
             gathered: vec![Gathered::zeroed(); slots],
             direct_sums: vec![DirectSum::zeroed(); slots],
+            coverage: vec![Coverage::zeroed(); slots],
             iterations: 0,
             emitted: 0,
             counters: Counters::default(),
@@ -163,6 +165,12 @@ impl Backend for Renderer {
         clock.time("direct", || {
             direct(&inputs, iteration, &self.visible_points, &counts, &mut self.direct_sums)
         });
+        if self.config.estimator == Estimator::Sppm {
+            let (points, statistics) = (&self.visible_points, &self.statistics);
+            clock.time("coverage", || {
+                coverage(&inputs, iteration, points, statistics, &mut self.coverage)
+            });
+        }
         clock.time("update", || {
             update(
                 &self.visible_points,
@@ -181,7 +189,14 @@ impl Backend for Renderer {
 
     fn resolve_all(&mut self) -> Result<Resolved> {
         let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
-        let film = resolve(&self.settings, &self.statistics, &self.direct_sums, iterations, emitted);
+        let film = resolve(
+            &self.settings,
+            &self.statistics,
+            &self.direct_sums,
+            &self.coverage,
+            iterations,
+            emitted,
+        );
         Ok(Resolved::from_film(self.config.resolution, &film))
     }
 

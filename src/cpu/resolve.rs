@@ -6,7 +6,16 @@ use glam::DVec4;
 
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{from_two_float, from_two_floats};
-use crate::layout::{DirectSum, Settings, Statistics};
+use crate::layout::{Coverage, DirectSum, Settings, Statistics};
+
+/// The part of the discs that can have photons; 1 where nothing is known of it.
+fn share_of(coverage: &Coverage) -> f64 {
+    if coverage.covered > 0 {
+        f64::from(coverage.covered) / f64::from(coverage.asked)
+    } else {
+        1.0
+    }
+}
 
 /// The picture, RGB and curvature, row by row from the top left: eq. 4 for each slot of a pixel, and the mean over the
 /// iterations of what was seen directly. `emitted` are the photon paths of all iterations.
@@ -14,6 +23,7 @@ pub fn resolve(
     settings: &Settings,
     statistics: &[Statistics],
     direct_sums: &[DirectSum],
+    coverage: &[Coverage],
     iterations: u32,
     emitted: u64,
 ) -> Vec<[f32; 4]> {
@@ -31,7 +41,7 @@ pub fn resolve(
             let tau = from_two_floats(statistics.flux_high, statistics.flux_low);
             radiance += from_two_floats(direct.high, direct.low) / f64::from(iterations);
             if radius2 > 0.0 {
-                radiance += tau / (PI * radius2 * emitted as f64);
+                radiance += tau / (PI * radius2 * share_of(&coverage[slot]) * emitted as f64);
             }
         }
         film[y as usize * width + x as usize] = radiance.as_vec4().to_array();

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 /// An orthonormal basis around the unit vector `n`: Duff and others, «Building an Orthonormal Basis, Revisited», 2017.
 /// The very same basis as the device's, so that the same numbers give the same direction.
-fn basis(n: DVec3) -> DMat3 {
+pub(super) fn basis(n: DVec3) -> DMat3 {
     let s = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (s + n.z);
     let b = n.x * n.y * a;

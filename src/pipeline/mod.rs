@@ -326,6 +326,7 @@ impl Renderer {
     fn reset(&mut self) -> Result<()> {
         let mut recording = reporting();
         recording.fill(BufferId::DirectSums, 0);
+        recording.fill(BufferId::CoverageOf, 0);
         recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.slots()));
         self.run(&recording).map(|_| ())
     }

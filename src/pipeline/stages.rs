@@ -43,6 +43,14 @@ impl Stages<'_> {
         }
         let turn = [iteration, self.config.block_of(iteration)];
         recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(turn));
+        // The paper has no such correction.
+        if self.config.estimator == Estimator::Sppm {
+            recording.dispatch(self.ray_stage(&shaders::COVERAGE, self.sizes.slots()).push([
+                turn[0],
+                turn[1],
+                self.config.coverage_points(iteration),
+            ]));
+        }
         recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.slots()));
         recording
     }

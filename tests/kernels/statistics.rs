@@ -5,7 +5,7 @@ use ppm_vk::backend::Backend;
 use ppm_vk::config::{Estimator, RADIUS_GROUPS, RenderConfig};
 use ppm_vk::cpu::{self, Counts};
 use ppm_vk::gather::METHODS;
-use ppm_vk::layout::{DirectSum, Gathered, NO_OBJECT, Photon, RadiusSum, Statistics, VisiblePoint};
+use ppm_vk::layout::{Coverage, DirectSum, Gathered, NO_OBJECT, Photon, RadiusSum, Statistics, VisiblePoint};
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
@@ -208,7 +208,7 @@ fn pictures_are_resolved_by_equation_4() {
         };
         let mut bench = Bench::new("cornell", config);
         let slots = bench.renderer.sizes().slots();
-        let (mut statistics, mut direct_sums) = (Vec::new(), Vec::new());
+        let (mut statistics, mut direct_sums, mut coverage) = (Vec::new(), Vec::new(), Vec::new());
         for [a, b, c, d] in random_numbers(slots) {
             // Flux of up to 10⁹ photons, radii from 10⁻⁴ to 0.1.
             let flux = 1e9 * a;
@@ -221,12 +221,25 @@ fn pictures_are_resolved_by_equation_4() {
                 high: [d, 1e6 * c, b, 0.0],
                 low: [0.0, 1e-2 * a, 0.0, 0.0],
             });
+            // Of some nothing is known yet.
+            coverage.push(Coverage {
+                covered: (16.0 * b) as u32,
+                asked: 16,
+            });
         }
         bench.upload(BufferId::StatisticsOf, &statistics);
         bench.upload(BufferId::DirectSums, &direct_sums);
+        bench.upload(BufferId::CoverageOf, &coverage);
         let (iterations, emitted) = (bench.renderer.iterations(), bench.renderer.emitted());
         let image = bench.renderer.resolve().expect("a picture");
-        let expected = cpu::resolve(&bench.settings, &statistics, &direct_sums, iterations, emitted);
+        let expected = cpu::resolve(
+            &bench.settings,
+            &statistics,
+            &direct_sums,
+            &coverage,
+            iterations,
+            emitted,
+        );
         for (pixel, (found, expected)) in image.pixels().iter().zip(&expected).enumerate() {
             for channel in 0..3 {
                 let difference = relative_difference(found[channel].into(), expected[channel].into());

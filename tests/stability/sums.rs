@@ -5,7 +5,7 @@ use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
 use ppm_vk::gather::METHODS;
-use ppm_vk::layout::{DirectSum, Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::layout::{Coverage, DirectSum, Gathered, Photon, Statistics, VisiblePoint};
 use ppm_vk::pipeline::Stages;
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
@@ -202,6 +202,7 @@ fn pictures_stay_right_when_more_than_two_to_the_32_photons_were_emitted() {
         };
         bench.upload(BufferId::StatisticsOf, &[statistics; SLOTS as usize]);
         bench.upload(BufferId::DirectSums, &[sum; SLOTS as usize]);
+        bench.upload(BufferId::CoverageOf, &[Coverage::zeroed(); SLOTS as usize]);
         let stages = Stages {
             config: &bench.config,
             sizes: bench.renderer.sizes(),

@@ -1,0 +1,89 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// How much of the disc of radius R around each visible point can have photons: past the edge of the object, or inside
+// another one that stands on it, there are none. Random points of the disc say whether it can; their share corrects eq. 4,
+// which takes the whole disc.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "random.glsl"
+#include "texel.glsl"
+#include "scene.glsl"
+#include "intersect.glsl"
+#include "object_grid.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+#include "status.glsl"
+
+layout(push_constant) uniform Push {
+    uint iteration;
+    uint block; // see config::RenderConfig::block_of
+    uint points; // a power of two up to WHOLE
+} push;
+
+uniform usamplerBuffer VisiblePoints;
+uniform usamplerBuffer StatisticsOf;
+layout(std430) buffer CoverageOf { Coverage coverage[]; };
+
+// What an iteration counts for, whatever its points.
+const uint WHOLE = 16u;
+// Surfaces that are crossed on the way at the most.
+const uint MOST_CROSSINGS = 4u;
+
+bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
+    uint object = floatBitsToUint(visible_point.position_object.w);
+    vec3 n = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
+    vec3 origin = offset_origin(visible_point.position_object.xyz, n, reach_of(object));
+    float r = radius * sqrt(u.x);
+    float phi = 2.0 * PI * u.y;
+    vec3 along = basis(n) * vec3(r * cos(phi), r * sin(phi), 0.0);
+    // Along the surface, into other objects and out of them again.
+    bool inside = false;
+    uint ignored = MISS;
+    float done = 0.0;
+    for (uint i = 0u; i < MOST_CROSSINGS; i++) {
+        Hit hit = trace(origin + done * along, (1.0 - done) * along, 1.0, ignored, false);
+        if (hit.triangle == MISS) {
+            break;
+        }
+        if (shading_triangle(hit.triangle).object == object) {
+            return true; // the surface bends up
+        }
+        inside = !inside;
+        done += hit.t * (1.0 - done);
+        ignored = hit.triangle;
+    }
+    if (inside) {
+        return false;
+    }
+    // Then down: it may bend, but it must be there.
+    Hit below = trace(origin + along, -radius * n, 1.0, MISS, false);
+    return below.triangle != MISS && shading_triangle(below.triangle).object == object;
+}
+
+void main() {
+    uint slot = invocation_index();
+    if (slot >= slots() || status.again != 0u) {
+        return;
+    }
+    VisiblePoint visible_point = VISIBLE_POINT(slot);
+    if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
+        return;
+    }
+    Random random = random_of_pixel(COVERAGE_SAMPLE, slot, push.iteration, push.block, settings.seed);
+    float radius = sqrt(TEXEL(StatisticsOf, 3u * slot).x);
+    uint covered = 0u;
+    for (uint i = 0u; i < push.points; i++) {
+        Random sample_random = sample_of(random, i, push.points);
+        covered += can_have_photons(visible_point, radius, next4(sample_random).xy) ? 1u : 0u;
+    }
+    // Where a driver has too few loop iterations for it (a thousand triangles in one place), eq. 4 stays as it is.
+    if (loops_cut) {
+        covered = push.points;
+    }
+    coverage[slot].covered += covered * (WHOLE / push.points);
+    coverage[slot].asked += WHOLE;
+}

@@ -1,0 +1,78 @@
+//! How much of the discs around visible points can have photons.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::Inputs;
+use super::intersect::{Ray, nearest_hit};
+use super::random::{PathKind, Random};
+use super::sampling::{basis, decode_direction};
+use super::surface::{offset_origin, reach_of};
+use super::vector::{word, xyz};
+use crate::layout::{Coverage, NO_OBJECT, Statistics, VisiblePoint};
+
+/// What an iteration counts for, whatever its points.
+const WHOLE: u32 = 16;
+/// Surfaces that are crossed on the way at the most.
+const MOST_CROSSINGS: u32 = 4;
+
+/// Asks points of the disc of radius R around each visible point: past the edge of the object, or inside another one that
+/// stands on it, there are no photons.
+pub fn coverage(
+    inputs: &Inputs<'_>,
+    iteration: u32,
+    visible_points: &[VisiblePoint],
+    statistics: &[Statistics],
+    coverage: &mut [Coverage],
+) {
+    let points = inputs.config.coverage_points(iteration);
+    let slots = coverage.par_iter_mut().zip(visible_points).zip(statistics).enumerate();
+    slots.for_each(|(slot, ((coverage, point), statistics))| {
+        if word(point.position_object) == NO_OBJECT {
+            return;
+        }
+        let random = Random::of_pixel(inputs, PathKind::Coverage, slot as u32, iteration);
+        let radius = f64::from(statistics.radius2_high).sqrt();
+        let covered = (0..points).filter(|&number| {
+            let [u, v, ..] = random.sample_of(number, points).next4();
+            can_have_photons(inputs, point, radius, u, v)
+        });
+        coverage.covered += covered.count() as u32 * (WHOLE / points);
+        coverage.asked += WHOLE;
+    });
+}
+
+fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f64, v: f64) -> bool {
+    let object = word(point.position_object);
+    let object_of = |triangle: u32| inputs.scene.shading_triangles[triangle as usize].object;
+    let n = decode_direction(word(point.weight_normal));
+    let origin = offset_origin(xyz(point.position_object), n, reach_of(inputs.scene, object));
+    let (sin, cos) = (TAU * v).sin_cos();
+    let r = radius * u.sqrt();
+    let along = basis(n) * DVec3::new(r * cos, r * sin, 0.0);
+    // Along the surface, into other objects and out of them again.
+    let (mut inside, mut ignored, mut done) = (false, None, 0.0);
+    for _ in 0..MOST_CROSSINGS {
+        let ray = Ray {
+            origin: origin + done * along,
+            direction: (1.0 - done) * along,
+        };
+        let Some(hit) = nearest_hit(inputs, ray, 1.0, ignored) else {
+            break;
+        };
+        if object_of(hit.triangle) == object {
+            return true; // the surface bends up
+        }
+        inside = !inside;
+        done += hit.t * (1.0 - done);
+        ignored = Some(hit.triangle);
+    }
+    // Then down: it may bend, but it must be there.
+    let down = Ray {
+        origin: origin + along,
+        direction: -radius * n,
+    };
+    !inside && nearest_hit(inputs, down, 1.0, None).is_some_and(|hit| object_of(hit.triangle) == object)
+}

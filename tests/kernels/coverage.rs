@@ -1,0 +1,103 @@
+//! The stage `coverage`.
+
+use bytemuck::Zeroable;
+use ppm_vk::config::RenderConfig;
+use ppm_vk::cpu;
+use ppm_vk::layout::{Coverage, Statistics, VisiblePoint};
+use ppm_vk::record::Recording;
+use ppm_vk::shaders;
+use ppm_vk::stage::{BufferId, StageDesc};
+
+use super::agreement::Agreement;
+use super::bench::{Bench, small, visible_point};
+
+/// What the first iteration of the stage finds at these points with these radii.
+fn on_device(bench: &mut Bench, points: &[VisiblePoint], statistics: &[Statistics]) -> Vec<Coverage> {
+    bench.upload(BufferId::VisiblePoints, points);
+    bench.upload(BufferId::StatisticsOf, statistics);
+    let mut recording = Recording::new();
+    recording.fill(BufferId::Status, 0);
+    recording.fill(BufferId::CoverageOf, 0);
+    let constants = vec![("SAMPLER", bench.config.sampler as u32)];
+    let push = [0, 0, bench.config.coverage_points(0)];
+    recording.dispatch(
+        StageDesc::new(&shaders::COVERAGE, points.len() as u32)
+            .constants(constants)
+            .push(push),
+    );
+    bench.renderer.run(&recording).expect("coverage");
+    bench.download(BufferId::CoverageOf)
+}
+
+#[test]
+fn points_can_have_photons_where_the_cpu_says_so() {
+    for name in ["cornell", "cornell-spheres", "pool"] {
+        let config = RenderConfig {
+            radius: Some(0.1),
+            ..small()
+        };
+        let mut bench = Bench::new(name, config);
+        let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
+        let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+        let found = on_device(&mut bench, &points, &statistics);
+        let mut expected = vec![Coverage::zeroed(); points.len()];
+        cpu::coverage(&bench.inputs(), 0, &points, &statistics, &mut expected);
+        let mut agreement = Agreement::default();
+        for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            assert_eq!(found.asked, expected.asked, "{name}, slot {slot}: asked");
+            agreement.note(found == expected, || {
+                format!("slot {slot}: {found:?} on the device, {expected:?} on the CPU")
+            });
+        }
+        // A point next to an edge lies on either side by rounding.
+        agreement.assert(&format!("coverage in {name}"), 0.99, 2000);
+        let partly = expected
+            .iter()
+            .filter(|coverage| coverage.covered < coverage.asked)
+            .count();
+        assert!(partly > 20, "{name}: only {partly} discs reach past an edge");
+    }
+}
+
+/// Each of 1,024 discs asks 16 points; that the mean of their shares is off by six deviations of independent points has a
+/// probability of 2·10⁻⁹.
+#[test]
+fn discs_that_reach_past_a_wall_are_covered_by_their_part_before_it() {
+    let config = RenderConfig {
+        resolution: [32, 32],
+        ..small()
+    };
+    let mut bench = Bench::new("furnace-closed", config);
+    // The floor of the room: its lowest triangles, seen from above.
+    let (scene, radius) = (&bench.scene, 0.2);
+    let corners = |t: &ppm_vk::layout::ShadingTriangle| [t.p0, t.p1, t.p2];
+    let low = scene
+        .shading_triangles
+        .iter()
+        .flat_map(corners)
+        .fold([f32::MAX; 3], |low, corner| {
+            [0, 1, 2].map(|axis: usize| low[axis].min(corner[axis]))
+        });
+    let floor = scene
+        .shading_triangles
+        .iter()
+        .find(|t| corners(t).iter().all(|corner| corner[2] == low[2]))
+        .expect("a wall at the lowest z");
+    let object = floor.object;
+    for distance in [0.0, 0.3, 0.8, 1.2] {
+        let point = visible_point([low[0] + distance * radius, 0.0, low[2]], object);
+        let count = bench.renderer.sizes().slots() as usize;
+        let (points, statistics) = (vec![point; count], vec![cpu::reset(radius * radius); count]);
+        let found = on_device(&mut bench, &points, &statistics);
+        let covered: u32 = found.iter().map(|coverage| coverage.covered).sum();
+        let share = f64::from(covered) / (16 * count) as f64;
+        // A segment of the disc lies past the wall.
+        let x = f64::from(distance).min(1.0);
+        let expected = 1.0 - (x.acos() - x * (1.0 - x * x).sqrt()) / std::f64::consts::PI;
+        let deviation = (expected * (1.0 - expected) / (16 * count) as f64).sqrt();
+        assert!(
+            (share - expected).abs() <= 6.0 * deviation + 1e-9,
+            "{distance} R from the wall: {share} of the disc is covered, {expected} expected"
+        );
+    }
+}
