@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // How much of the disc of radius R around each visible point can have photons: past the edge of the object, or inside
-// another one that stands on it, there are none. Random points of the disc say whether it can; their share corrects eq. 4,
+// an opaque one that stands on it, there are none. Random points of the disc say whether it can; their share corrects eq. 4,
 // which takes the whole disc.
 
 layout(local_size_x = 64) in;
@@ -49,10 +49,12 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
         if (hit.triangle == MISS) {
             break;
         }
-        if (shading_triangle(hit.triangle).object == object) {
+        ShadingTriangle met = shading_triangle(hit.triangle);
+        if (met.object == object) {
             return true; // the surface bends up
         }
-        inside = !inside;
+        // Light passes glass.
+        inside = inside != (material_at(met.material).surface != DIELECTRIC);
         done += hit.t * (1.0 - done);
         ignored = hit.triangle;
     }

@@ -9,7 +9,7 @@ use super::Inputs;
 use super::intersect::{Ray, nearest_hit};
 use super::random::{PathKind, Random};
 use super::sampling::{basis, decode_direction};
-use super::surface::{offset_origin, reach_of};
+use super::surface::{DIELECTRIC, offset_origin, reach_of};
 use super::vector::{word, xyz};
 use crate::layout::{Coverage, NO_OBJECT, Statistics, VisiblePoint};
 
@@ -18,7 +18,7 @@ const WHOLE: u32 = 16;
 /// Surfaces that are crossed on the way at the most.
 const MOST_CROSSINGS: u32 = 4;
 
-/// Asks points of the disc of radius R around each visible point: past the edge of the object, or inside another one that
+/// Asks points of the disc of radius R around each visible point: past the edge of the object, or inside an opaque one that
 /// stands on it, there are no photons.
 pub fn coverage(
     inputs: &Inputs<'_>,
@@ -47,6 +47,10 @@ pub fn coverage(
 fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f64, v: f64) -> bool {
     let object = word(point.position_object);
     let object_of = |triangle: u32| inputs.scene.shading_triangles[triangle as usize].object;
+    let surface_of = |triangle: u32| {
+        let triangle = &inputs.scene.shading_triangles[triangle as usize];
+        inputs.scene.materials[triangle.material as usize].surface
+    };
     let n = decode_direction(word(point.weight_normal));
     let origin = offset_origin(xyz(point.position_object), n, reach_of(inputs.scene, object));
     let (sin, cos) = (TAU * v).sin_cos();
@@ -65,7 +69,8 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
         if object_of(hit.triangle) == object {
             return true; // the surface bends up
         }
-        inside = !inside;
+        // Light passes glass.
+        inside ^= surface_of(hit.triangle) != DIELECTRIC;
         done += hit.t * (1.0 - done);
         ignored = Some(hit.triangle);
     }

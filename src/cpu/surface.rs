@@ -12,6 +12,8 @@ use crate::scene::PackedScene;
 pub(super) const MATTE: u32 = 0;
 /// [`Material::surface`] of a perfect mirror.
 pub(super) const MIRROR: u32 = 1;
+/// [`Material::surface`] of glass.
+pub(super) const DIELECTRIC: u32 = 2;
 
 /// A point of a triangle.
 pub(super) struct Surface<'a> {
