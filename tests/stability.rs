@@ -1,5 +1,5 @@
 //! Hard cases: scenes, settings and numbers at the edge of what a renderer can be given, each with a measure that shows
-//! that the picture is right there. docs/stability.md lists them, and what happens without the guard of each.
+//! that the picture is right there. docs/accuracy.md lists them, and what happens without the guard of each.
 //!
 //! Every picture and buffer of every case is searched for NaN, infinity and negative values (`sound`).
 
