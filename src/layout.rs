@@ -11,6 +11,11 @@ pub const NO_LIGHT: u32 = u32::MAX;
 /// Bit of a reference to a [`BvhRecord`]: it is a triangle of a leaf.
 pub const LEAF: u32 = 1 << 31;
 
+/// Bit of [`ShadingTriangle::flags`]: the shading normals differ from the geometric one.
+pub const SMOOTH_SHADED: u32 = 1;
+/// Bit of [`ShadingTriangle::flags`]: a dielectric's, and it may lie on a face of another object.
+pub const TOUCHED: u32 = 2;
+
 /// Bit of [`StatusCounters::again`]: a lane's photons or a batch's didn't fit.
 pub const PHOTONS_DID_NOT_FIT: u32 = 1;
 /// Bit of [`StatusCounters::again`]: a lane's paths need more loop iterations than the driver gives.
@@ -122,8 +127,8 @@ device_structs! {
         pub object: u32,
         /// Index of its material.
         pub material: u32,
-        /// 1 where the shading normals differ from the geometric one.
-        pub smooth_shaded: u32,
+        /// [`SMOOTH_SHADED`], [`TOUCHED`].
+        pub flags: u32,
         /// Index of its light, or [`NO_LIGHT`].
         pub light: u32,
     }

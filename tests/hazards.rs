@@ -5,6 +5,7 @@ use ppm_vk::config::{Limits, RenderConfig, Sizes};
 use ppm_vk::gather::METHODS;
 use ppm_vk::pipeline::Stages;
 use ppm_vk::record::{Command, Recording};
+use ppm_vk::scene::SceneFeatures;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
@@ -54,6 +55,7 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
         let stages = Stages {
             config: &config,
             sizes: &sizes,
+            features: SceneFeatures::ALL,
         };
         recordings.push((method.name.to_owned(), stages.iteration(1)));
     }

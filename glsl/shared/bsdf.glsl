@@ -57,6 +57,7 @@ struct Boundary {
     vec3 refracted;
 };
 
+// ior: index of the inside over that of the outside.
 Boundary meet_boundary(Facing facing, vec3 incoming, float ior) {
     Boundary boundary;
     boundary.eta = facing.front ? 1.0 / ior : ior;

@@ -1,10 +1,18 @@
 // The scene as the rays see it. Include after settings.glsl, sampling.glsl and texel.glsl.
 
+// What the scene has, see scene::SceneFeatures: there is no code for the rest.
+layout(constant_id = 6) const bool MIRRORS = true;
+layout(constant_id = 7) const bool DIELECTRICS = true;
+layout(constant_id = 8) const bool CONTACT = true;
+
 const uint MISS = 0xffffffffu;
 
 const uint NO_LIGHT = 0xffffffffu;
 
-const uint MATTE = 0u;
+// Flags of a triangle.
+const uint SMOOTH_SHADED = 1u; // the shading normals differ from the geometric one
+const uint TOUCHED = 2u;       // a dielectric's, and it may lie on a face of another object
+
 const uint MIRROR = 1u;
 const uint DIELECTRIC = 2u;
 
@@ -22,13 +30,13 @@ struct ShadingTriangle {
     vec4 p2;
     uint object;
     uint material;
-    uint smooth_shaded; // 1 where the shading normals differ from the geometric one
-    uint light;         // NO_LIGHT where it doesn't emit
+    uint flags; // SMOOTH_SHADED, TOUCHED
+    uint light; // NO_LIGHT where it doesn't emit
 };
 
 struct Material {
     vec3 base_color;
-    uint surface;      // MATTE, MIRROR or DIELECTRIC
+    uint surface;      // MIRROR, DIELECTRIC or 0 for matte
     vec3 emission;     // radiance
     float ior;
     uint double_sided; // emits on both sides
@@ -60,6 +68,18 @@ Material material_at(uint i) {
     return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, rest.y, rest.z, rest.w);
 }
 
+bool is_mirror(Material material) {
+    return MIRRORS && material.surface == MIRROR;
+}
+
+bool is_dielectric(Material material) {
+    return DIELECTRICS && material.surface == DIELECTRIC;
+}
+
+bool is_matte(Material material) {
+    return !is_mirror(material) && !is_dielectric(material);
+}
+
 struct Hit {
     float t;
     float u;
@@ -77,10 +97,11 @@ struct Surface {
     uint object;
     uint material;
     uint light;
+    uint flags;
 };
 
 vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_normal) {
-    if (triangle.smooth_shaded == 0u) {
+    if ((triangle.flags & SMOOTH_SHADED) == 0u) {
         return geometric_normal;
     }
     vec3 n0 = decode_direction(floatBitsToUint(triangle.p0.w));
@@ -105,6 +126,7 @@ Surface surface_at(uint index, vec2 uv) {
     surface.object = triangle.object;
     surface.material = triangle.material;
     surface.light = triangle.light;
+    surface.flags = triangle.flags;
     return surface;
 }
 
@@ -112,7 +134,8 @@ Surface surface_at(uint index, vec2 uv) {
 // triangle's plane, both a few roundings of the corners' coordinates: Pharr, Jakob and Humphreys, «Physically Based
 // Rendering», 3rd edition, 2016, section 3.9.5. Near the origin, where floats are fine, so is the step: what lies a
 // hundred-millionth of the scene away isn't jumped over.
+const float ROUNDINGS = 16.0 / 16777216.0;
+
 vec3 offset_origin(vec3 p, vec3 n, vec3 reach) {
-    const float ROUNDINGS = 16.0 / 16777216.0;
     return p + ROUNDINGS * dot(abs(n), reach) * n;
 }

@@ -12,6 +12,7 @@ layout(local_size_x = 64) in;
 #include "scene.glsl"
 #include "intersect.glsl"
 #include "bsdf.glsl"
+#include "contact.glsl"
 #include "light.glsl"
 #include "visible_point.glsl"
 #include "status.glsl"
@@ -52,7 +53,7 @@ Glimpse glimpse(vec3 origin, vec3 direction, uint ignored) {
     }
     Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
     Material material = material_at(surface.material);
-    bool dark = material.surface == MATTE && largest(material.base_color) == 0.0;
+    bool dark = is_matte(material) && largest(material.base_color) == 0.0;
     return Glimpse(emits(material, face(surface, direction).front) ? material.emission : vec3(0.0), dark);
 }
 
@@ -94,14 +95,15 @@ void main() {
         if (loops_cut) {
             cut = true;
         } else if (hit.triangle != MISS) {
-            Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
-            Material material = material_at(surface.material);
-            Facing facing = face(surface, branch.direction);
+            Encounter met = encounter(hit, branch.direction);
+            Surface surface = met.surface;
+            Material material = met.material;
+            Facing facing = met.facing;
             if (emits(material, facing.front)) {
                 branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * material.emission;
             }
             branch.emission_seen = false;
-            if (material.surface == MATTE) {
+            if (is_matte(material)) {
                 if (largest(material.base_color) > 0.0) {
                     visible_point.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
                     visible_point.weight_normal = vec4(branch.throughput * material.base_color / PI,
@@ -113,16 +115,16 @@ void main() {
             } else {
                 ended = false;
                 branch.depth += 1u;
-                branch.ignored = hit.triangle;
+                branch.ignored = surface.triangle;
                 u = next4(random);
-                if (material.surface == MIRROR) {
+                if (is_mirror(material)) {
                     float cos_i = -dot(branch.direction, facing.shading_normal);
                     branch.throughput *= fresnel_schlick(material.base_color, cos_i);
                     branch.direction = mirror_direction(facing, branch.direction);
-                } else {
-                    Boundary boundary = meet_boundary(facing, branch.direction, material.ior);
+                } else if (DIELECTRICS) {
+                    Boundary boundary = meet_boundary(facing, branch.direction, material.ior / met.outside);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
-                    vec3 transmission = material.base_color * (boundary.eta * boundary.eta);
+                    vec3 transmission = met.tint * (boundary.eta * boundary.eta);
                     bool split = used + pending_count + 1u < SLOTS && boundary.reflectance < 1.0;
                     bool reflect_now = u.x < boundary.reflectance;
                     if (split) {
@@ -139,7 +141,7 @@ void main() {
                         // A lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
                         branch.reflection_seen = true;
                         vec3 from = origin_towards(surface, boundary.reflected);
-                        Glimpse reflection = glimpse(from, boundary.reflected, hit.triangle);
+                        Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle);
                         branch.emitted += branch.throughput * boundary.reflectance * reflection.emission;
                         if (reflection.dark) {
                             // That was all there is to the reflection.

@@ -54,15 +54,18 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
             return true; // the surface bends up
         }
         // Light passes glass.
-        inside = inside != (material_at(met.material).surface != DIELECTRIC);
+        inside = inside != !is_dielectric(material_at(met.material));
         done += hit.t * (1.0 - done);
         ignored = hit.triangle;
     }
     if (inside) {
         return false;
     }
-    // Then down: it may bend, but it must be there.
+    // Then down: it may bend, but it must be there, under glass that lies on it too.
     Hit below = trace(origin + along, -radius * n, 1.0, MISS, false);
+    if (CONTACT && below.triangle != MISS && is_dielectric(material_at(shading_triangle(below.triangle).material))) {
+        below = trace(origin + along, -radius * n, 1.0, below.triangle, false);
+    }
     return below.triangle != MISS && shading_triangle(below.triangle).object == object;
 }
 

@@ -14,6 +14,7 @@ layout(local_size_x = 64) in;
 #include "scene.glsl"
 #include "intersect.glsl"
 #include "bsdf.glsl"
+#include "contact.glsl"
 #include "light.glsl"
 #include "photon.glsl"
 #include "status.glsl"
@@ -110,12 +111,13 @@ void main() {
             alive = false;
             continue;
         }
-        Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
-        Material material = material_at(surface.material);
-        Facing facing = face(surface, path.direction);
-        vec4 u = next4(random);
         vec3 incoming = path.direction;
-        if (material.surface == MATTE) {
+        Encounter met = encounter(hit, incoming);
+        Surface surface = met.surface;
+        Material material = met.material;
+        Facing facing = met.facing;
+        vec4 u = next4(random);
+        if (is_matte(material)) {
             // A photon's flux is per area of the surface; the shading normal's cosine replaces the geometric one's:
             // Veach, «Robust Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
             float correction = dot(incoming, facing.shading_normal) / dot(incoming, facing.geometric_normal);
@@ -138,20 +140,20 @@ void main() {
             alive = dot(outgoing, facing.shading_normal) > 0.0 && finite(scattered) &&
                     survives(path.flux, scattered, u.z);
             path.direction = outgoing;
-        } else if (material.surface == MIRROR) {
+        } else if (is_mirror(material)) {
             float cos_i = -dot(incoming, facing.shading_normal);
             alive = survives(path.flux, path.flux * fresnel_schlick(material.base_color, cos_i), u.z);
             path.direction = mirror_direction(facing, incoming);
             path.seen_directly = false;
-        } else {
-            Boundary boundary = meet_boundary(facing, incoming, material.ior);
+        } else if (DIELECTRICS) {
+            Boundary boundary = meet_boundary(facing, incoming, material.ior / met.outside);
             bool reflected = u.x < boundary.reflectance;
-            alive = reflected || survives(path.flux, path.flux * material.base_color, u.z);
+            alive = reflected || survives(path.flux, path.flux * met.tint, u.z);
             path.direction = reflected ? boundary.reflected : boundary.refracted;
             path.seen_directly = false;
         }
         path.origin = origin_towards(surface, path.direction);
-        path.ignored = hit.triangle;
+        path.ignored = surface.triangle;
         path.depth += 1u;
         if (alive && path.depth >= settings.max_depth) {
             truncated += 1u;

@@ -76,6 +76,7 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
             },
             "emissive_triangles": packed.lights.len(),
             "cameras": scene.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
+            "features": packed.features.names(),
             "bounds": { "min": low.to_array(), "max": high.to_array() },
             "warnings": scene.warnings,
         });
@@ -100,6 +101,16 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
     for (index, camera) in scene.cameras.iter().enumerate() {
         writeln!(text, "camera {index:<5} {}", camera.name)?;
     }
+    let features = packed.features.names();
+    writeln!(
+        text,
+        "features     {}",
+        if features.is_empty() {
+            "none".into()
+        } else {
+            features.join(", ")
+        }
+    )?;
     writeln!(text, "bounds       {low} to {high}")?;
     for warning in &scene.warnings {
         writeln!(text, "warning      {warning}")?;

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::contact::Encounter;
 use super::intersect::{Ray, nearest_hit};
 use super::light::emits;
 use super::random::{PathKind, Random};
@@ -102,9 +103,13 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
             let Some(hit) = nearest_hit(inputs, branch.ray, FAR, branch.ignored) else {
                 break nothing_seen(branch.emitted);
             };
-            let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
             let incoming = branch.ray.direction;
-            let facing = Facing::new(&surface, incoming);
+            let Encounter {
+                surface,
+                facing,
+                ior,
+                tint,
+            } = Encounter::new(inputs, hit, incoming);
             let base_color = rgb(surface.material.base_color);
             if emits(surface.material, facing.front) {
                 let emission = rgb(surface.material.emission);
@@ -132,15 +137,15 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
                 break nothing_seen(branch.emitted);
             }
             branch.depth += 1;
-            branch.ignored = Some(hit.triangle);
+            branch.ignored = Some(surface.triangle);
             let [choice, ..] = random.next4();
             branch.ray.direction = if surface.material.surface == MIRROR {
                 branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
                 facing.reflect(incoming)
             } else {
-                let boundary = Boundary::new(&facing, incoming, surface.material.ior);
+                let boundary = Boundary::new(&facing, incoming, ior);
                 // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
-                let transmission = base_color * boundary.eta.powi(2);
+                let transmission = tint * boundary.eta.powi(2);
                 match boundary.refracted {
                     // While a slot is free, both branches are followed, each weighed with its share.
                     Some(refracted) if used + pending.len() + 1 < slots.len() => {
@@ -164,7 +169,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
                                 origin: surface.origin_towards(boundary.reflected),
                                 direction: boundary.reflected,
                             };
-                            let (emission, dark) = glimpse(inputs, ray, Some(hit.triangle));
+                            let (emission, dark) = glimpse(inputs, ray, Some(surface.triangle));
                             branch.emitted += branch.throughput * boundary.reflectance * emission;
                             if dark {
                                 branch.throughput *= 1.0 - boundary.reflectance;

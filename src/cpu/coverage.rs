@@ -74,10 +74,16 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
         done += hit.t * (1.0 - done);
         ignored = Some(hit.triangle);
     }
-    // Then down: it may bend, but it must be there.
+    // Then down: it may bend, but it must be there, under glass that lies on it too.
     let down = Ray {
         origin: origin + along,
         direction: -radius * n,
     };
-    !inside && nearest_hit(inputs, down, 1.0, None).is_some_and(|hit| object_of(hit.triangle) == object)
+    let mut below = nearest_hit(inputs, down, 1.0, None);
+    if let Some(hit) = below
+        && surface_of(hit.triangle) == DIELECTRIC
+    {
+        below = nearest_hit(inputs, down, 1.0, Some(hit.triangle));
+    }
+    !inside && below.is_some_and(|hit| object_of(hit.triangle) == object)
 }

@@ -10,6 +10,7 @@
 //! sum depends on an order.
 
 mod camera;
+mod contact;
 mod coverage;
 mod direct;
 mod gather;

@@ -5,11 +5,12 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::contact::Encounter;
 use super::intersect::{Ray, nearest_hit};
 use super::light::{Choice, choose_light};
 use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction, triangle_point};
-use super::surface::{Boundary, Facing, MATTE, MIRROR, offset_origin, surface_at};
+use super::surface::{Boundary, MATTE, MIRROR, offset_origin, surface_at};
 use super::vector::{rgb, with_word};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
@@ -97,10 +98,14 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         let Some(hit) = nearest_hit(inputs, path.ray, FAR, path.ignored) else {
             return;
         };
-        let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
-        let material = surface.material;
         let incoming = path.ray.direction;
-        let facing = Facing::new(&surface, incoming);
+        let Encounter {
+            surface,
+            facing,
+            ior,
+            tint,
+        } = Encounter::new(inputs, hit, incoming);
+        let material = surface.material;
         let [choice, second, survival, _] = random.next4();
         let (direction, flux) = if material.surface == MATTE {
             // Flux is per area of the geometric surface, scattering per cosine to the shading normal: Veach, «Robust
@@ -127,12 +132,11 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             let reflected = path.flux * facing.mirror_reflectance(material.base_color, incoming);
             (facing.reflect(incoming), roulette(path.flux, reflected, survival))
         } else {
-            let boundary = Boundary::new(&facing, incoming, material.ior);
+            let boundary = Boundary::new(&facing, incoming, ior);
             match boundary.refracted {
-                Some(refracted) if choice >= boundary.reflectance => (
-                    refracted,
-                    roulette(path.flux, path.flux * rgb(material.base_color), survival),
-                ),
+                Some(refracted) if choice >= boundary.reflectance => {
+                    (refracted, roulette(path.flux, path.flux * tint, survival))
+                }
                 _ => (boundary.reflected, Some(path.flux)),
             }
         };
@@ -143,7 +147,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
                 direction,
             },
             flux,
-            ignored: Some(hit.triangle),
+            ignored: Some(surface.triangle),
             seen_directly: false,
         };
     }

@@ -58,7 +58,7 @@ impl Renderer {
             storage_buffer_bytes: PHOTON_BYTES,
             loop_limit: u32::MAX,
             lanes: LANES,
-            glass: scene.has_glass(),
+            glass: scene.features.dielectric,
             meshes: scene.object_grids.len() as u32,
             object_cells: scene.object_cells,
         };

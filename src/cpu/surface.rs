@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::sampling::decode_direction;
 use super::vector::{rgb, word, xyz};
-use crate::layout::{Material, ShadingTriangle};
+use crate::layout::{Material, SMOOTH_SHADED, ShadingTriangle};
 use crate::scene::PackedScene;
 
 /// [`Material::surface`] of a Lambertian reflector.
@@ -16,7 +16,10 @@ pub(super) const MIRROR: u32 = 1;
 pub(super) const DIELECTRIC: u32 = 2;
 
 /// A point of a triangle.
+#[derive(Clone, Copy)]
 pub(super) struct Surface<'a> {
+    /// Index of the triangle.
+    pub triangle: u32,
     pub position: DVec3,
     /// Largest coordinates of the triangle's corners, without their signs.
     pub reach: DVec3,
@@ -28,14 +31,17 @@ pub(super) struct Surface<'a> {
     pub material: &'a Material,
     /// Index of its light, or [`crate::layout::NO_LIGHT`].
     pub light: u32,
+    /// Of the triangle.
+    pub flags: u32,
 }
 
 /// The point with the barycentric coordinates `u` and `v` of the second and the third corner.
-pub(super) fn surface_at(scene: &PackedScene, triangle: u32, u: f64, v: f64) -> Surface<'_> {
-    let triangle = &scene.shading_triangles[triangle as usize];
+pub(super) fn surface_at(scene: &PackedScene, index: u32, u: f64, v: f64) -> Surface<'_> {
+    let triangle = &scene.shading_triangles[index as usize];
     let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(xyz);
     let geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
     Surface {
+        triangle: index,
         position: p0 + u * (p1 - p0) + v * (p2 - p0),
         reach: p0.abs().max(p1.abs()).max(p2.abs()),
         geometric_normal,
@@ -43,6 +49,7 @@ pub(super) fn surface_at(scene: &PackedScene, triangle: u32, u: f64, v: f64) -> 
         object: triangle.object,
         material: &scene.materials[triangle.material as usize],
         light: triangle.light,
+        flags: triangle.flags,
     }
 }
 
@@ -56,7 +63,7 @@ impl Surface<'_> {
 }
 
 fn interpolated_normal(triangle: &ShadingTriangle, u: f64, v: f64, geometric_normal: DVec3) -> DVec3 {
-    if triangle.smooth_shaded == 0 {
+    if triangle.flags & SMOOTH_SHADED == 0 {
         return geometric_normal;
     }
     let [n0, n1, n2] = [triangle.p0, triangle.p1, triangle.p2].map(|corner| decode_direction(word(corner)));
@@ -69,11 +76,13 @@ fn interpolated_normal(triangle: &ShadingTriangle, u: f64, v: f64, geometric_nor
     }
 }
 
+/// Parts of a triangle's coordinates by which rays leave it.
+pub(super) const ROUNDINGS: f64 = 16.0 / 16_777_216.0;
+
 /// Moves a ray's origin off its surface, to the side of `n`, by a bound of the rounding errors that positions and planes
 /// of triangles with corners up to `reach` have on a device: Pharr, Jakob and Humphreys, «Physically Based Rendering»,
 /// 3rd edition, 2016, section 3.9.5.
 pub(super) fn offset_origin(position: DVec3, n: DVec3, reach: DVec3) -> DVec3 {
-    const ROUNDINGS: f64 = 16.0 / 16_777_216.0;
     position + ROUNDINGS * n.abs().dot(reach) * n
 }
 
@@ -142,14 +151,10 @@ pub(super) struct Boundary {
 }
 
 impl Boundary {
-    /// Snell's law and Fresnel's equations for unpolarised light, between vacuum and an inside of index `ior`.
-    pub fn new(facing: &Facing, incoming: DVec3, ior: f32) -> Self {
+    /// Snell's law and Fresnel's equations for unpolarised light; `ior`: index of the inside over that of the outside.
+    pub fn new(facing: &Facing, incoming: DVec3, ior: f64) -> Self {
         let n = facing.shading_normal;
-        let (n_i, n_t) = if facing.front {
-            (1.0, f64::from(ior))
-        } else {
-            (f64::from(ior), 1.0)
-        };
+        let (n_i, n_t) = if facing.front { (1.0, ior) } else { (ior, 1.0) };
         let eta = n_i / n_t;
         let cos_i = -incoming.dot(n);
         let sin2_t = eta * eta * (1.0 - cos_i * cos_i).max(0.0);
@@ -205,12 +210,12 @@ mod tests {
 
     #[test]
     fn brewsters_angle_passes_all_parallel_light_and_beyond_the_critical_one_none_passes() {
-        let ior: f32 = 1.5;
-        let brewster = f64::from(ior).atan();
+        let ior: f64 = 1.5;
+        let brewster = ior.atan();
         // r∥ = 0 there, r⊥ = cos²θ_i − sin²θ_i.
         let expected = 0.5 * (brewster.cos().powi(2) - brewster.sin().powi(2)).powi(2);
         assert!((Boundary::new(&facing(true), incoming(brewster), ior).reflectance - expected).abs() < 1e-12);
-        let critical = (1.0 / f64::from(ior)).asin();
+        let critical = (1.0 / ior).asin();
         assert!(
             Boundary::new(&facing(false), incoming(critical - 1e-6), ior)
                 .refracted

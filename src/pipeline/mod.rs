@@ -13,7 +13,7 @@ use crate::layout::{
     GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Photon, Settings, StatusCounters, VisiblePoint,
 };
 use crate::record::{Recording, Run};
-use crate::scene::{Camera, PackedScene};
+use crate::scene::{Camera, PackedScene, SceneFeatures};
 use crate::stage::{BufferId, StageDesc};
 use crate::{radius, shaders};
 use stages::{method_stages, reporting};
@@ -25,6 +25,7 @@ pub struct Renderer {
     sizes: Sizes,
     limits: Limits,
     settings: Settings,
+    features: SceneFeatures,
     iterations: u32,
     emitted: u64,
     counters: Counters,
@@ -80,7 +81,7 @@ impl Renderer {
             storage_buffer_bytes: buffer_bytes,
             loop_limit: loop_budget(device.loop_limit()),
             lanes: if device.summary().kind == "cpu" { 4096 } else { 1 << 18 },
-            glass: scene.has_glass(),
+            glass: scene.features.dielectric,
             meshes: scene.object_grids.len() as u32,
             object_cells: scene.object_cells,
         };
@@ -106,6 +107,7 @@ impl Renderer {
             sizes,
             limits,
             settings,
+            features: scene.features,
             iterations: 0,
             emitted: 0,
             counters: Counters::default(),
@@ -127,6 +129,7 @@ impl Renderer {
         Stages {
             config: &self.config,
             sizes: &self.sizes,
+            features: self.features,
         }
     }
 

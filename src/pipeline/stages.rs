@@ -3,6 +3,7 @@
 use crate::config::{Accel, Direct, Estimator, RenderConfig, Sizes, TriangleTest};
 use crate::gather::{METHODS, Record, default_method, scan};
 use crate::record::Recording;
+use crate::scene::SceneFeatures;
 use crate::shaders;
 use crate::stage::{BufferId, Shader, StageDesc};
 
@@ -13,6 +14,8 @@ pub struct Stages<'a> {
     pub config: &'a RenderConfig,
     /// Its buffers' sizes.
     pub sizes: &'a Sizes,
+    /// What its scene has.
+    pub features: SceneFeatures,
 }
 
 /// The stages of a gather method that [`super::Renderer::new`] has let pass.
@@ -93,13 +96,19 @@ impl Stages<'_> {
 
     /// A stage that traces rays.
     fn ray_stage(&self, shader: &'static Shader, threads: u32) -> StageDesc {
-        StageDesc::new(shader, threads).constants(vec![
+        let mut constants = vec![
             ("BRUTE_FORCE", u32::from(self.config.accel == Accel::Brute)),
             ("HAVEL", u32::from(self.config.triangle_test == TriangleTest::Havel)),
             ("SAMPLER", self.config.sampler as u32),
             ("SLOTS", self.sizes.slots_per_pixel),
             ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
             ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),
-        ])
+        ];
+        constants.extend(
+            self.features
+                .constants()
+                .map(|(name, present)| (name, u32::from(present))),
+        );
+        StageDesc::new(shader, threads).constants(constants)
     }
 }

@@ -8,9 +8,11 @@ mod buffer;
 mod builder;
 mod bvh;
 mod camera;
+mod contact;
 mod diagnostic;
 mod document;
 mod facet;
+mod features;
 mod geometry;
 mod glb;
 mod graph;
@@ -21,6 +23,7 @@ pub mod object_grid;
 mod packed;
 mod primitive;
 
+pub use features::SceneFeatures;
 pub use packed::PackedScene;
 
 use glam::{DVec3, Vec3};

@@ -2,12 +2,12 @@
 
 use glam::{DVec3, Vec3};
 
+use super::features::{DIELECTRIC, SceneFeatures};
 use super::object_grid::object_grids;
-use super::{Scene, Surface, bvh};
-use crate::layout::{BvhRecord, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, ShadingTriangle};
-
-/// A dielectric's [`Material::surface`].
-const DIELECTRIC: u32 = 2;
+use super::{Scene, Surface, bvh, contact};
+use crate::layout::{
+    BvhRecord, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, SMOOTH_SHADED, ShadingTriangle, TOUCHED,
+};
 
 /// What the ray stages read, in the order of the BVH's leaves.
 #[derive(Debug, Clone)]
@@ -20,6 +20,8 @@ pub struct PackedScene {
     pub shading_triangles: Vec<ShadingTriangle>,
     /// Materials.
     pub materials: Vec<Material>,
+    /// What the kernels need to know.
+    pub features: SceneFeatures,
     /// Emissive triangles.
     pub lights: Vec<Light>,
     /// The paper's grid of each object.
@@ -55,26 +57,25 @@ impl PackedScene {
         for (index, light) in lights.iter().enumerate() {
             shading_triangles[light.triangle as usize].light = index as u32;
         }
+        let materials: Vec<Material> = scene.materials.iter().map(material).collect();
+        let touched = contact::touched(&bvh.records, &shading_triangles, &materials);
+        for (triangle, touched) in shading_triangles.iter_mut().zip(touched) {
+            triangle.flags |= if touched { TOUCHED } else { 0 };
+        }
         let (object_grids, object_cells) = object_grids(scene);
         Ok(Self {
+            features: SceneFeatures::of(&shading_triangles, &materials),
             object_grids,
             object_cells,
             havel_triangles: corners.iter().map(havel_triangle).collect(),
             shading_triangles,
             bsdf_sampling: bsdf_sampling(scene, &lights),
-            materials: scene.materials.iter().map(material).collect(),
+            materials,
             lights,
             bvh: bvh.records,
             order: bvh.order,
             scale: scene.normalisation.scale,
         })
-    }
-}
-
-impl PackedScene {
-    /// Whether a path can split in two at some surface.
-    pub fn has_glass(&self) -> bool {
-        self.materials.iter().any(|material| material.surface == DIELECTRIC)
     }
 }
 
@@ -113,7 +114,7 @@ fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTr
         p2: vertex(2),
         object: triangle.object,
         material: scene.objects[triangle.object as usize].material,
-        smooth_shaded: smooth_shaded.into(),
+        flags: if smooth_shaded { SMOOTH_SHADED } else { 0 },
         light: NO_LIGHT,
     }
 }

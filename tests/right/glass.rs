@@ -165,8 +165,7 @@ fn photons_pass_a_plate_as_fresnel_says_at_every_angle() {
 /// πL the share 1 − R enters the water, and of what the floor reflects, R' is sent back to it, R and R' being diffuse
 /// reflectances from above and from below. Radiance ρE / π comes out divided by n²: without that the floor would be n²,
 /// 1.77, times too bright.
-#[test]
-fn a_floor_seen_through_water_is_as_bright_as_etendue_says() {
+fn assert_floor_under_water_is_as_bright_as_etendue_says(bottom: f64) {
     const SIDE: usize = 48;
     const ALBEDO: f64 = 0.5;
     let mut scene = Document::new("water");
@@ -181,7 +180,7 @@ fn a_floor_seen_through_water_is_as_bright_as_etendue_says() {
     }
     scene.object(
         "water",
-        &Mesh::cuboid(dvec3(-2.05, -0.05, -2.05), dvec3(2.05, 0.4, 2.05)),
+        &Mesh::cuboid(dvec3(-2.05, bottom, -2.05), dvec3(2.05, 0.4, 2.05)),
         water,
     );
     scene.camera([1.6, 0.8], [0.4, 0.0], 25.0);
@@ -203,5 +202,16 @@ fn a_floor_seen_through_water_is_as_bright_as_etendue_says() {
         ..small(SIDE as u32, 40_000)
     };
     let measured = measure(&scene, config, 32, |image| vec![all.of(image, 0)]);
-    measured[0].assert_is(expected, "the floor under water");
+    measured[0].assert_is(expected, &format!("the floor under water that begins at {bottom}"));
+}
+
+#[test]
+fn a_floor_seen_through_water_is_as_bright_as_etendue_says() {
+    assert_floor_under_water_is_as_bright_as_etendue_says(-0.05);
+}
+
+/// Rays meet the water's own lower side or the floor there, whichever rounding puts first.
+#[test]
+fn a_floor_on_which_water_lies_is_as_bright_as_etendue_says() {
+    assert_floor_under_water_is_as_bright_as_etendue_says(0.0);
 }

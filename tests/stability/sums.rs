@@ -8,6 +8,7 @@ use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{Coverage, DirectSum, Gathered, Photon, Statistics, VisiblePoint};
 use ppm_vk::pipeline::Stages;
 use ppm_vk::record::Recording;
+use ppm_vk::scene::SceneFeatures;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
@@ -206,6 +207,7 @@ fn pictures_stay_right_when_more_than_two_to_the_32_photons_were_emitted() {
         let stages = Stages {
             config: &bench.config,
             sizes: bench.renderer.sizes(),
+            features: SceneFeatures::ALL,
         };
         let recording = stages.picture(iterations, emitted);
         bench.renderer.run(&recording).expect("a run");

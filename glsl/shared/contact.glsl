@@ -1,0 +1,48 @@
+// Dielectrics that lie on other objects. Include after intersect.glsl.
+
+// Where a ray meets matter: a surface, and the index of refraction on its outer side.
+struct Encounter {
+    Surface surface;
+    Material material;
+    Facing facing;
+    float outside;
+    vec3 tint; // of both sides of a dielectric boundary
+};
+
+// Rounding decides which of two faces in one place a ray meets first, and the step off the one takes it past the other: where
+// they are no further apart, both are crossed at once. Glass on glass is one boundary between the two; where glass lies on
+// something opaque, that is what the ray meets.
+Encounter encounter(Hit hit, vec3 incoming) {
+    Encounter met;
+    met.surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
+    met.material = material_at(met.surface.material);
+    met.facing = face(met.surface, incoming);
+    met.outside = 1.0;
+    met.tint = met.material.base_color;
+    bool touched = CONTACT && (met.surface.flags & TOUCHED) != 0u;
+    if (!touched) {
+        return met;
+    }
+    vec3 n = met.surface.geometric_normal;
+    float step_off = ROUNDINGS * dot(abs(n), met.surface.reach);
+    float probe = ROUNDINGS * (met.surface.reach.x + met.surface.reach.y + met.surface.reach.z);
+    Hit other_hit = trace(met.surface.position + probe * n, -2.0 * probe * n, 1.0, hit.triangle, false);
+    if (other_hit.triangle == MISS) {
+        return met;
+    }
+    Surface other = surface_at(other_hit.triangle, vec2(other_hit.u, other_hit.v));
+    bool apart = abs(dot(other.position - met.surface.position, n)) > step_off;
+    if (apart || other.object == met.surface.object) {
+        return met;
+    }
+    Material other_material = material_at(other.material);
+    if (!is_dielectric(other_material)) {
+        met.surface = other;
+        met.material = other_material;
+        met.facing = face(other, incoming);
+    } else if (dot(other.geometric_normal, n) < 0.0) {
+        met.outside = other_material.ior;
+        met.tint *= other_material.base_color;
+    }
+    return met;
+}
