@@ -147,14 +147,39 @@ impl ErrorEstimate {
         })
     }
 
-    /// Standard error of each pixel by noise, in units of radiance; `None` before there are enough iterations.
-    pub fn standard_errors(&self) -> Option<Image> {
+    /// The error of each pixel by noise and bias, root of the mean square, in units of radiance; `None` before there are
+    /// enough iterations. A pixel's bias is that of the pixels around it: its own is all but lost in noise.
+    pub fn of_pixels(&self) -> Option<Image> {
         let pictures = self.batches()?;
         let last = &pictures[pictures.len() - 1].image;
-        let errors: Vec<f32> = Self::values(pictures).map(|(_, noise2)| noise2.sqrt() as f32).collect();
-        let pixels = errors.as_chunks().0.to_vec();
-        Some(Image::new(last.width(), last.height(), pixels))
+        let values: Vec<(f64, f64)> = Self::values(pictures).collect();
+        let bias2 = mean_around(&Self::bias2(pictures).collect::<Vec<_>>(), last.width());
+        let pixels = values.as_chunks::<3>().0.iter().zip(bias2);
+        let pixels = pixels.map(|(channels, bias2)| {
+            let mean = channels.iter().map(|(value, _)| value).sum::<f64>() / 3.0;
+            channels.map(|(value, noise2)| {
+                let share = if mean > 0.0 { value / mean } else { 0.0 };
+                (noise2 + bias2.max(0.0) * share * share).sqrt() as f32
+            })
+        });
+        Some(Image::new(last.width(), last.height(), pixels.collect()))
     }
+}
+
+/// Mean over the pixels that are no more than two columns or rows away.
+fn mean_around(values: &[f64], width: usize) -> Vec<f64> {
+    const REACH: usize = 2;
+    let height = values.len() / width;
+    let near = |at: usize, side: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(side);
+    let mean = |pixel: usize| {
+        let (columns, rows) = (near(pixel % width, width), near(pixel / width, height));
+        let count = columns.len() * rows.len();
+        let sum: f64 = rows
+            .map(|row| values[row * width..][columns.clone()].iter().sum::<f64>())
+            .sum();
+        sum / count as f64
+    };
+    (0..values.len()).map(mean).collect()
 }
 
 #[cfg(test)]
@@ -183,7 +208,7 @@ mod tests {
                 .iter()
                 .map(|sum| sum.map(|value| (value / f64::from(i)) as f32))
                 .collect();
-            estimate.add(i, Resolved::from_film([PIXELS as u32, 1], &last));
+            estimate.add(i, Resolved::from_film([50, PIXELS as u32 / 50], &last));
         }
         let channels = last.iter().flat_map(|pixel: &[f32; 4]| &pixel[..3]);
         let squares: f64 = channels.map(|&value| (f64::from(value) - 1.0).powi(2)).sum();
@@ -217,6 +242,21 @@ mod tests {
             );
             assert!(found.bias > found.noise, "α {alpha}: {found:?}");
         }
+    }
+
+    #[test]
+    fn the_error_of_pixels_has_noise_and_bias_and_its_mean_square_is_that_of_the_picture() {
+        let (estimate, _) = rendered(192, 0.1, 0.1, 2.0 / 3.0);
+        let picture = estimate.relative(192).expect("an estimate");
+        let pixels = estimate.of_pixels().expect("errors");
+        let samples = pixels.pixels().as_flattened();
+        let mean_square = samples.iter().map(|&error| f64::from(error).powi(2)).sum::<f64>() / samples.len() as f64;
+        // Values of 1 with relMSE's floor. A negative squared bias, which noise makes, counts 0 in a pixel.
+        let found = (mean_square / 1.01).sqrt();
+        assert!(
+            (found / picture.total - 1.0).abs() < 0.05,
+            "{found}, of the picture {picture:?}"
+        );
     }
 
     #[test]

@@ -95,7 +95,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         seconds,
         estimated_error: estimated.map(|error| error.total),
     };
-    film::write_exr(&image, estimate.standard_errors().as_ref(), &output, &metadata)?;
+    film::write_exr(&image, estimate.of_pixels().as_ref(), &output, &metadata)?;
     if let Some(png) = &arguments.png {
         film::write_png(&image, png, arguments.exposure)?;
     }

@@ -55,8 +55,8 @@ fn custom_attributes(metadata: &Metadata) -> HashMap<Text, AttributeValue> {
 /// # Errors
 /// As [`check_writable`](super::check_writable); further if the disk is full.
 ///
-/// `errors`, if given, are written as channels `error.R`, `error.G`, `error.B`: the standard error of each pixel, as the
-/// render estimated it.
+/// `errors`, if given, are written as channels `error.R`, `error.G`, `error.B`: the error of each pixel, as the render
+/// estimated it.
 pub fn write_exr(image: &Image, errors: Option<&Image>, path: &Path, metadata: &Metadata) -> Result<()> {
     let attributes = LayerAttributes {
         software_name: Some(Text::from(concat!("ppm-vk ", env!("CARGO_PKG_VERSION")))),
