@@ -2,7 +2,8 @@
 
 use super::{Image, write_whole};
 use crate::error::{Error, Result};
-use image::ImageEncoder;
+use image::ImageEncoder as _;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use std::path::Path;
 
 /// Writes an 8-bit sRGB PNG: radiance times 2^`exposure_ev`, the Khronos PBR Neutral tone mapper, the sRGB transfer
@@ -31,7 +32,7 @@ pub fn write_rgb8(size: [usize; 2], bytes: &[u8], path: &Path) -> Result<()> {
     let cannot_encode = |what: String| Error::file(path, format!("can't be encoded as PNG: {what}"));
     let side = |pixels: usize| u32::try_from(pixels).map_err(|error| cannot_encode(error.to_string()));
     let mut file = Vec::new();
-    image::codecs::png::PngEncoder::new(&mut file)
+    PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive)
         .write_image(bytes, side(size[0])?, side(size[1])?, image::ExtendedColorType::Rgb8)
         .map_err(|error| cannot_encode(error.to_string()))?;
     write_whole(path, &file)

@@ -24,6 +24,8 @@ struct Errors {
     iterations: u32,
     noise: [f64; SQUARES],
     squared_bias: [f64; SQUARES],
+    /// Of the picture over the reference, in each channel.
+    ratio_of_means: [f64; 3],
 }
 
 /// Sums of the pictures that single iterations make, those of even number and those of odd number apart.
@@ -62,7 +64,9 @@ impl Halves {
             iterations,
             noise: [0.0; SQUARES],
             squared_bias: [0.0; SQUARES],
+            ratio_of_means: [0.0; 3],
         };
+        let mut means = [[0.0; 2]; 3];
         for (sample, &reference) in references.iter().enumerate() {
             let (pixel, side) = (sample / 3, dim.len().isqrt());
             if !dim[pixel] {
@@ -72,9 +76,12 @@ impl Halves {
             let reference = f64::from(reference);
             let [even, odd] = [0, 1].map(|half_number| self.sums[half_number][sample] / half - reference);
             let weight = 1.0 / (reference * reference + REL_MSE_FLOOR * mean * mean) / count;
+            means[sample % 3][0] += 0.5 * (even + odd) + reference;
+            means[sample % 3][1] += reference;
             errors.noise[square] += weight * (0.5 * (even - odd)).powi(2);
             errors.squared_bias[square] += weight * even * odd;
         }
+        errors.ratio_of_means = means.map(|[found, expected]| found / expected);
         errors
     }
 }
@@ -162,8 +169,8 @@ fn noise_slope(alpha: f64, iterations: impl Iterator<Item = u32>) -> f64 {
     log_slope(iterations.map(|count| (count, noise_after(count))))
 }
 
-/// relMSE's slope, printed with its parts as they fall. Photons bring all light.
-fn assert_falls_as_theory_says(name: &str, alpha: f32, radius: f64, iterations: u32) -> f64 {
+/// relMSE's slope, printed with its parts as they fall, and the ratio of means in the end. Photons bring all light.
+fn assert_falls_as_theory_says(name: &str, alpha: f32, radius: f64, iterations: u32) -> (f64, [f64; 3]) {
     let config = RenderConfig {
         direct: Direct::Photons,
         // What theory speaks of: evenly spread samples fall faster at first.
@@ -187,6 +194,8 @@ fn assert_falls_as_theory_says(name: &str, alpha: f32, radius: f64, iterations: 
             sum(&squared_bias)
         );
     }
+    let last = errors.last().expect("errors");
+    println!("{name}, α {alpha:.3}: ratio of means {:?}", last.ratio_of_means);
     let alpha = f64::from(alpha);
     let expected = noise_slope(alpha, errors.iter().map(|error| error.iterations));
     let what = format!("{name}, α {alpha:.3}");
@@ -195,7 +204,7 @@ fn assert_falls_as_theory_says(name: &str, alpha: f32, radius: f64, iterations: 
     Slope::of(&errors, squared_bias).assert_between(smooth, edges, &format!("{what}, squared bias"));
     let slope = Slope::of(&errors, total).value;
     println!("{what}, relMSE: slope {slope:.3}");
-    slope
+    (slope, last.ratio_of_means)
 }
 
 /// With α = 2/3 the noise and the smooth part of the squared bias fall alike, as n^(−2/3). The initial radius is a fraction
@@ -206,10 +215,14 @@ fn the_error_falls_as_theory_says() {
         return;
     }
     for name in ["cornell", "cornell-spheres"] {
-        let slope = assert_falls_as_theory_says(name, 2.0 / 3.0, 0.015, 1024);
+        let (slope, ratios) = assert_falls_as_theory_says(name, 2.0 / 3.0, 0.015, 1024);
         assert!(
             (slope + 2.0 / 3.0).abs() < 0.08,
             "{name}: relMSE falls with iterations to the power {slope:.3}"
+        );
+        assert!(
+            ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.003),
+            "{name}: ratio of means {ratios:?} after 1024 iterations"
         );
     }
 }
