@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::layout::{
-    Coverage, DirectSum, Gathered, GridShape, Photon, RadiusSum, Statistics, StatusCounters, VisiblePoint,
+    Coverage, DirectSum, Gathered, Gloss, GridShape, Photon, RadiusSum, Statistics, StatusCounters, VisiblePoint,
 };
 use crate::stage::BufferId;
 
@@ -231,6 +231,8 @@ pub struct Sizes {
     pub meshes: u32,
     /// Cells of all objects' grids.
     pub object_cells: u32,
+    /// Whether the scene has glossy surfaces.
+    pub glossy: bool,
     /// Photons of such a cell at the most.
     pub cell_photons: Option<u32>,
     /// What a bench asks of the gathers.
@@ -265,7 +267,9 @@ pub struct Limits {
     /// Invocations that keep the device busy.
     pub lanes: u32,
     /// Whether the scene has surfaces at which a path splits in two.
-    pub glass: bool,
+    pub splitting: bool,
+    /// Whether it has glossy surfaces.
+    pub glossy: bool,
     /// The scene's objects.
     pub meshes: u32,
     /// Cells of all objects' grids.
@@ -287,7 +291,7 @@ impl Sizes {
         let pixel_slots = width.div_ceil(TILE) * height.div_ceil(TILE) * TILE * TILE;
         let fitting = limits.storage_buffer_bytes / size_of::<VisiblePoint>() as u64 / u64::from(pixel_slots);
         let slots_per_pixel = match config.estimator {
-            Estimator::Ppm if limits.glass => PPM_SLOTS.min(fitting.max(1) as u32),
+            Estimator::Ppm if limits.splitting => PPM_SLOTS.min(fitting.max(1) as u32),
             _ => 1,
         };
         let photons_at_most = (limits.storage_buffer_bytes / size_of::<Photon>() as u64) as u32;
@@ -307,6 +311,7 @@ impl Sizes {
             cell_bits: (batch_paths.ilog2() + 3).clamp(12, 24),
             meshes: limits.meshes,
             object_cells: limits.object_cells,
+            glossy: limits.glossy,
             cell_photons: config.cell_photons,
             probe: Probe::default(),
         };
@@ -375,6 +380,7 @@ impl Sizes {
         let scan_blocks = scanned.map(|count| count.div_ceil(u64::from(SCAN_BLOCK)));
         let (count, size) = match id {
             BufferId::VisiblePoints => (slots, size_of::<VisiblePoint>()),
+            BufferId::GlossOf => (if self.glossy { slots } else { 1 }, size_of::<Gloss>()),
             BufferId::StatisticsOf => (slots, size_of::<Statistics>()),
             BufferId::GatheredOf => (slots, size_of::<Gathered>()),
             BufferId::DirectSums => (slots, size_of::<DirectSum>()),
@@ -454,7 +460,8 @@ mod tests {
                 storage_buffer_bytes,
                 loop_limit: u32::MAX,
                 lanes,
-                glass: false,
+                splitting: false,
+                glossy: false,
                 meshes: 5,
                 object_cells: 500,
             };

@@ -134,10 +134,10 @@ device_structs! {
     }
 
     /// A material.
-    pub struct Material: 48 {
+    pub struct Material: 64 {
         /// Linear RGB albedo, reflectance or tint.
         pub base_color: [f32; 3],
-        /// 0 matte, 1 mirror, 2 dielectric.
+        /// 0 matte, 1 mirror, 2 dielectric, 3 glossy.
         pub surface: u32,
         /// Emitted radiance, linear RGB.
         pub emission: [f32; 3],
@@ -145,12 +145,16 @@ device_structs! {
         pub ior: f32,
         /// 1 where the back emits as well.
         pub double_sided: u32,
+        /// How far a glossy surface is a metal.
+        pub metallic: f32,
+        /// Of a glossy surface; its square is GGX's α.
+        pub roughness: f32,
         /// Zero.
-        pub padding0: u32,
-        /// Zero.
-        pub padding1: u32,
-        /// Zero.
-        pub padding2: u32,
+        pub padding: u32,
+        /// Reflectance at normal incidence of the glossy surface's dielectric part, linear RGB.
+        pub specular_f0: [f32; 3],
+        /// Its reflectance at grazing incidence.
+        pub specular_f90: f32,
     }
 
     /// An emissive triangle.
@@ -173,6 +177,15 @@ device_structs! {
         pub weight_normal: [f32; 4],
         /// rgb: radiance that the path saw by itself; w: u32 bits, octahedral shading normal on the viewer's side.
         pub emitted_normal: [f32; 4],
+    }
+
+    /// How a visible point's surface scatters, where the scene has glossy ones.
+    pub struct Gloss: 32 {
+        /// rgb: albedo under the reflecting boundary; w: u32 bits, octahedral direction to the viewer.
+        pub diffuse_viewer: [f32; 4],
+        /// rgb: reflectance of the boundary at normal incidence; w: u32 bits, two f16, at grazing incidence and GGX's α, 0
+        /// where the path followed the reflection itself.
+        pub f0_f90_alpha: [f32; 4],
     }
 
     /// A photon.

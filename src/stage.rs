@@ -22,6 +22,8 @@ pub enum BufferId {
     Lights,
     /// [`crate::layout::VisiblePoint`]s in slot order.
     VisiblePoints,
+    /// [`crate::layout::Gloss`] of each slot, where the scene has glossy surfaces.
+    GlossOf,
     /// [`crate::layout::Statistics`] of each slot.
     StatisticsOf,
     /// [`crate::layout::Gathered`] of each slot.

@@ -47,7 +47,8 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
             storage_buffer_bytes,
             loop_limit: u32::MAX,
             lanes: 4096,
-            glass: true,
+            splitting: true,
+            glossy: true,
             meshes: 9,
             object_cells: 9 * 1024,
         };

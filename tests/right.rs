@@ -15,6 +15,8 @@ mod energy;
 mod furnace;
 #[path = "right/glass.rs"]
 mod glass;
+#[path = "right/gloss.rs"]
+mod gloss;
 #[path = "right/lamp.rs"]
 mod lamp;
 #[path = "right/measure.rs"]

@@ -49,6 +49,28 @@ vec3 mirror_direction(Facing facing, vec3 incoming) {
     return normalize(reflected);
 }
 
+// Where a glossy surface scatters a photon to that comes from v, instead of the cosine-distributed `outgoing` or as that says,
+// and the part of the flux that goes there. Chosen by u.w, drawn by u.xy.
+vec3 scatter(Reflector reflector, Facing facing, vec3 v, vec4 u, inout vec3 outgoing) {
+    vec3 n = facing.shading_normal;
+    float nv = dot(n, v);
+    float p = reflection_probability(reflector, nv);
+    bool reflects = u.w < p;
+    if (reflector.alpha < SMOOTH_ALPHA) {
+        if (reflects) {
+            outgoing = mirror_direction(facing, -v);
+            return fresnel(reflector, nv) / p;
+        }
+        return PI / (1.0 - p) * brdf(reflector, n, v, outgoing);
+    }
+    if (reflects) {
+        outgoing = reflected_direction(reflector.alpha, n, v, u.xy);
+    }
+    float cosine = max(dot(outgoing, facing.geometric_normal), 0.0);
+    float density = mix(cosine * (1.0 / PI), reflected_density(reflector.alpha, n, v, outgoing), p);
+    return brdf(reflector, n, v, outgoing) * (cosine / max(density, 1e-20));
+}
+
 // What can happen at a dielectric boundary.
 struct Boundary {
     float reflectance;

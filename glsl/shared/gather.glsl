@@ -5,6 +5,7 @@ layout(constant_id = 0) const bool COUNT_TESTS = false;
 
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer StatisticsOf;
+uniform usamplerBuffer GlossOf;
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot, where they are counted
 const uint GATHERED_FOR = 0x80000000u;           // and whether it was its turn
@@ -15,15 +16,30 @@ struct Receiver {
     float radius2;
     uint object; // NO_OBJECT where there is no visible point
     vec3 normal; // of any length
+    // Of glossy scenes.
+    vec3 shading_normal;
+    vec3 viewer;
+    Reflector reflector;
 };
 
-const Receiver NO_RECEIVER = Receiver(vec3(0.0), -1.0, NO_OBJECT, vec3(0.0));
+const Receiver NO_RECEIVER = Receiver(vec3(0.0), -1.0, NO_OBJECT, vec3(0.0), vec3(0.0), vec3(0.0),
+                                      Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0));
 
 Receiver receiver_at(uint slot) {
     vec4 position_object = TEXEL(VisiblePoints, 3u * slot);
     vec4 weight_normal = TEXEL(VisiblePoints, 3u * slot + 1u);
-    return Receiver(position_object.xyz, TEXEL(StatisticsOf, 3u * slot).x, floatBitsToUint(position_object.w),
-                    decode_octahedral(floatBitsToUint(weight_normal.w)));
+    Receiver receiver = NO_RECEIVER;
+    receiver.position = position_object.xyz;
+    receiver.radius2 = TEXEL(StatisticsOf, 3u * slot).x;
+    receiver.object = floatBitsToUint(position_object.w);
+    receiver.normal = decode_octahedral(floatBitsToUint(weight_normal.w));
+    if (GLOSSY) {
+        Gloss gloss = GLOSS(slot);
+        receiver.shading_normal = decode_direction(floatBitsToUint(TEXEL(VisiblePoints, 3u * slot + 2u).w));
+        receiver.viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
+        receiver.reflector = reflector_of(gloss);
+    }
+    return receiver;
 }
 
 float squared_distance(vec3 a, vec3 b) {
@@ -55,6 +71,11 @@ void gather(Receiver receiver, Photon photon, inout Sum sum) {
     float distance2;
     bool accepted = accepts(receiver, photon, distance2);
     vec3 flux = photon.flux_direction.rgb;
+    if (GLOSSY) {
+        // What is summed up is what the surface scatters to the viewer. A photon that is no match may have no direction.
+        vec3 l = -decode_direction(floatBitsToUint(photon.flux_direction.w));
+        flux *= accepted ? brdf(receiver.reflector, receiver.shading_normal, receiver.viewer, l) : vec3(0.0);
+    }
     sum.flux += accepted ? flux : vec3(0.0);
     sum.count += accepted ? 1u : 0u;
     sum.moment += accepted ? mean_of(flux) * distance2 : 0.0;

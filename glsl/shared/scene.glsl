@@ -1,4 +1,4 @@
-// The scene as the rays see it. Include after settings.glsl, sampling.glsl and texel.glsl.
+// The scene as the rays see it. Include after settings.glsl, sampling.glsl, gloss.glsl and texel.glsl.
 
 // What the scene has, see scene::SceneFeatures: there is no code for the rest.
 layout(constant_id = 6) const bool MIRRORS = true;
@@ -15,6 +15,7 @@ const uint TOUCHED = 2u;       // a dielectric's, and it may lie on a face of an
 
 const uint MIRROR = 1u;
 const uint DIELECTRIC = 2u;
+const uint GLOSSY_SURFACE = 3u;
 
 // Havel and Herout's precomputed triangle.
 struct HavelTriangle {
@@ -36,13 +37,15 @@ struct ShadingTriangle {
 
 struct Material {
     vec3 base_color;
-    uint surface;      // MIRROR, DIELECTRIC or 0 for matte
+    uint surface;      // MIRROR, DIELECTRIC, GLOSSY_SURFACE or 0 for matte
     vec3 emission;     // radiance
     float ior;
     uint double_sided; // emits on both sides
-    uint padding0;
-    uint padding1;
-    uint padding2;
+    float metallic;    // of a glossy surface
+    float roughness;
+    uint padding;
+    vec3 specular_f0;  // of its dielectric part
+    float specular_f90;
 };
 
 uniform usamplerBuffer Bvh;
@@ -62,10 +65,15 @@ ShadingTriangle shading_triangle(uint i) {
 }
 
 Material material_at(uint i) {
-    vec4 color = TEXEL(Materials, 3u * i);
-    vec4 emission = TEXEL(Materials, 3u * i + 1u);
-    uvec4 rest = TEXEL_BITS(Materials, 3u * i + 2u);
-    return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, rest.y, rest.z, rest.w);
+    vec4 color = TEXEL(Materials, 4u * i);
+    vec4 emission = TEXEL(Materials, 4u * i + 1u);
+    uvec4 rest = TEXEL_BITS(Materials, 4u * i + 2u);
+    vec4 specular = vec4(0.0);
+    if (GLOSSY) {
+        specular = TEXEL(Materials, 4u * i + 3u);
+    }
+    return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, uintBitsToFloat(rest.y),
+                    uintBitsToFloat(rest.z), rest.w, specular.rgb, specular.w);
 }
 
 bool is_mirror(Material material) {
@@ -76,8 +84,18 @@ bool is_dielectric(Material material) {
     return DIELECTRICS && material.surface == DIELECTRIC;
 }
 
+bool is_glossy(Material material) {
+    return GLOSSY && material.surface == GLOSSY_SURFACE;
+}
+
 bool is_matte(Material material) {
-    return !is_mirror(material) && !is_dielectric(material);
+    return !is_mirror(material) && !is_dielectric(material) && !is_glossy(material);
+}
+
+Reflector reflector_of(Material material) {
+    return Reflector(material.base_color * (1.0 - material.metallic),
+                     mix(material.specular_f0, material.base_color, material.metallic),
+                     mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness);
 }
 
 struct Hit {

@@ -7,6 +7,7 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
+#include "gloss.glsl"
 #include "random.glsl"
 #include "texel.glsl"
 #include "scene.glsl"
@@ -28,6 +29,7 @@ layout(push_constant) uniform Push {
 } push;
 
 layout(std430) writeonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+layout(std430) writeonly buffer GlossOf { Gloss gloss_of_slots[]; };
 
 struct Branch {
     vec3 origin;
@@ -55,6 +57,17 @@ Glimpse glimpse(vec3 origin, vec3 direction, uint ignored) {
     Material material = material_at(surface.material);
     bool dark = is_matte(material) && largest(material.base_color) == 0.0;
     return Glimpse(emits(material, face(surface, direction).front) ? material.emission : vec3(0.0), dark);
+}
+
+// Follows what a boundary of microfacets reflects, or none of it where that would fly into the surface.
+void reflect_branch(inout Branch branch, Reflector reflector, Facing facing, vec2 u) {
+    vec3 viewer = -branch.direction;
+    branch.direction = reflector.alpha < SMOOTH_ALPHA
+                           ? mirror_direction(facing, branch.direction)
+                           : reflected_direction(reflector.alpha, facing.shading_normal, viewer, u);
+    branch.throughput *= dot(branch.direction, facing.geometric_normal) > 0.0
+                             ? reflected_weight(reflector, facing.shading_normal, viewer, branch.direction)
+                             : vec3(0.0);
 }
 
 void main() {
@@ -87,6 +100,7 @@ void main() {
     bool alive = inside;
     bool cut = false;
     VisiblePoint visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
+    Gloss gloss = Gloss(vec4(0.0), vec4(0.0));
     while (alive) {
         loop_count += 1u;
         bool ended = true;
@@ -103,24 +117,42 @@ void main() {
                 branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * material.emission;
             }
             branch.emission_seen = false;
-            if (is_matte(material)) {
-                if (largest(material.base_color) > 0.0) {
-                    visible_point.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
-                    visible_point.weight_normal = vec4(branch.throughput * material.base_color / PI,
-                                                       uintBitsToFloat(encode_direction(facing.geometric_normal)));
-                    visible_point.emitted_normal.w = uintBitsToFloat(encode_direction(facing.shading_normal));
-                }
-            } else if (branch.depth + 1u >= settings.max_depth) {
+            // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
+            Reflector reflector = Reflector(material.base_color, vec3(0.0), 0.0, 0.0);
+            if (is_glossy(material)) {
+                reflector = reflector_of(material);
+            }
+            vec3 viewer = -branch.direction;
+            bool stops = is_matte(material) || (is_glossy(material) && reflector.alpha >= FOLLOWED_ALPHA);
+            if (!stops && branch.depth + 1u >= settings.max_depth) {
                 atomicAdd(status.truncated_paths, 1u);
-            } else {
+            } else if (!stops) {
                 ended = false;
                 branch.depth += 1u;
                 branch.ignored = surface.triangle;
                 u = next4(random);
                 if (is_mirror(material)) {
-                    float cos_i = -dot(branch.direction, facing.shading_normal);
-                    branch.throughput *= fresnel_schlick(material.base_color, cos_i);
+                    branch.throughput *= fresnel_schlick(material.base_color, dot(viewer, facing.shading_normal));
                     branch.direction = mirror_direction(facing, branch.direction);
+                } else if (is_glossy(material)) {
+                    Branch reflected = branch;
+                    float p = reflection_probability(reflector, dot(viewer, facing.shading_normal));
+                    reflect_branch(reflected, reflector, facing, u.yz);
+                    if (p > 0.0 && p < 1.0 && used + pending_count + 1u < SLOTS) {
+                        reflected.emitted = vec3(0.0);
+                        reflected.origin = origin_towards(surface, reflected.direction);
+                        pending[pending_count] = reflected;
+                        pending_count += 1u;
+                        stops = true;
+                    } else if (u.x < p) {
+                        branch = reflected;
+                        branch.throughput *= 1.0 / p;
+                    } else {
+                        branch.throughput *= 1.0 / (1.0 - p);
+                        stops = true;
+                    }
+                    reflector.alpha = 0.0;
+                    ended = stops || largest(branch.throughput) <= 0.0;
                 } else if (DIELECTRICS) {
                     Boundary boundary = meet_boundary(facing, branch.direction, material.ior / met.outside);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
@@ -155,10 +187,25 @@ void main() {
                 }
                 branch.origin = origin_towards(surface, branch.direction);
             }
+            if (stops && (largest(reflector.diffuse) > 0.0 || reflector.alpha > 0.0)) {
+                vec3 weight = branch.throughput;
+                if (GLOSSY) {
+                    gloss = gloss_of(reflector, viewer);
+                } else {
+                    weight *= reflector.diffuse / PI;
+                }
+                visible_point.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
+                visible_point.weight_normal =
+                    vec4(weight, uintBitsToFloat(encode_direction(facing.geometric_normal)));
+                visible_point.emitted_normal.w = uintBitsToFloat(encode_direction(facing.shading_normal));
+            }
         }
         if (ended) {
             visible_point.emitted_normal.rgb = branch.emitted;
             visible_points[pixel_slot * SLOTS + used] = visible_point;
+            if (GLOSSY) {
+                gloss_of_slots[pixel_slot * SLOTS + used] = gloss;
+            }
             used += 1u;
             alive = pending_count > 0u && !cut;
             if (alive) {

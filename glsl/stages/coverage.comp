@@ -9,6 +9,7 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
+#include "gloss.glsl"
 #include "random.glsl"
 #include "texel.glsl"
 #include "scene.glsl"

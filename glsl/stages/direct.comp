@@ -8,6 +8,7 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
+#include "gloss.glsl"
 #include "random.glsl"
 #include "texel.glsl"
 #include "scene.glsl"
@@ -28,6 +29,7 @@ layout(push_constant) uniform Push {
 } push;
 
 uniform usamplerBuffer VisiblePoints;
+uniform usamplerBuffer GlossOf;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 
 // A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
@@ -39,13 +41,28 @@ const float ENDS_BEFORE = 16.0 / 16777216.0;
 vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     Random random = random_of_pixel(LIGHT_SAMPLE, slot, push.iteration, push.block, settings.seed);
     vec4 u = next4(random);
-    bool by_bsdf = u.w < settings.bsdf_sampling;
 
     vec3 position = visible_point.position_object.xyz;
     vec3 geometric_normal = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
     vec3 shading_normal = decode_direction(floatBitsToUint(visible_point.emitted_normal.w));
     vec3 origin = offset_origin(position, geometric_normal, reach_of(floatBitsToUint(visible_point.position_object.w)));
     vec3 ray = cosine_direction(shading_normal, u.yz);
+    // A reflection may be too narrow for points of lights to find it.
+    Reflector reflector = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0);
+    vec3 viewer = vec3(0.0);
+    float bsdf_sampling = settings.bsdf_sampling;
+    float reflections = 0.0; // of the directions of the BSDF
+    if (GLOSSY) {
+        Gloss gloss = GLOSS(slot);
+        reflector = reflector_of(gloss);
+        viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
+        if (reflector.alpha > 0.0) {
+            bsdf_sampling = 0.5;
+            reflections = reflection_probability(reflector, dot(shading_normal, viewer));
+            ray = u.x < reflections ? reflected_direction(reflector.alpha, shading_normal, viewer, u.yz) : ray;
+        }
+    }
+    bool by_bsdf = u.w < bsdf_sampling;
     uint ignored = MISS;
     Surface emitter;
     if (!by_bsdf) {
@@ -87,8 +104,14 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     // Densities per solid angle.
     float of_light = light.probability * distance2 / (light.area * abs(cos_light));
     float of_bsdf = cos_surface / PI;
-    return visible_point.weight_normal.rgb * material.emission *
-           (cos_surface / mix(of_light, of_bsdf, settings.bsdf_sampling));
+    vec3 weight = visible_point.weight_normal.rgb;
+    if (GLOSSY) {
+        weight *= brdf(reflector, shading_normal, viewer, direction);
+        if (reflector.alpha > 0.0) {
+            of_bsdf = mix(of_bsdf, reflected_density(reflector.alpha, shading_normal, viewer, direction), reflections);
+        }
+    }
+    return weight * material.emission * (cos_surface / mix(of_light, of_bsdf, bsdf_sampling));
 }
 
 void main() {

@@ -10,6 +10,7 @@ layout(local_size_x = 64) in;
 #include "settings.glsl"
 #include "texel.glsl"
 #include "sampling.glsl"
+#include "gloss.glsl"
 #include "photon.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"

@@ -9,6 +9,7 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
+#include "gloss.glsl"
 #include "random.glsl"
 #include "texel.glsl"
 #include "scene.glsl"
@@ -117,7 +118,7 @@ void main() {
         Material material = met.material;
         Facing facing = met.facing;
         vec4 u = next4(random);
-        if (is_matte(material)) {
+        if (is_matte(material) || is_glossy(material)) {
             // A photon's flux is per area of the surface; the shading normal's cosine replaces the geometric one's:
             // Veach, «Robust Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
             float correction = dot(incoming, facing.shading_normal) / dot(incoming, facing.geometric_normal);
@@ -137,6 +138,9 @@ void main() {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             vec3 outgoing = cosine_direction(facing.geometric_normal, u.xy);
             vec3 scattered = flux * material.base_color;
+            if (is_glossy(material)) {
+                scattered = flux * scatter(reflector_of(material), facing, -incoming, u, outgoing);
+            }
             alive = dot(outgoing, facing.shading_normal) > 0.0 && finite(scattered) &&
                     survives(path.flux, scattered, u.z);
             path.direction = outgoing;

@@ -7,6 +7,7 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
+#include "gloss.glsl"
 #include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"

@@ -2,22 +2,25 @@
 
 use std::f64::consts::PI;
 
+use bytemuck::Zeroable;
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::contact::Encounter;
+use super::gloss::{FOLLOWED_ALPHA, Reflector};
 use super::intersect::{Ray, nearest_hit};
 use super::light::emits;
 use super::random::{PathKind, Random};
 use super::sampling::encode_direction;
-use super::surface::{Boundary, Facing, MATTE, MIRROR, surface_at};
+use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface, surface_at};
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{NO_OBJECT, VisiblePoint};
+use crate::layout::{Gloss, NO_OBJECT, VisiblePoint};
 
-/// What is left of a path that splits at glass.
+/// What is left of a path that splits.
+#[derive(Clone, Copy)]
 struct Branch {
     ray: Ray,
     throughput: DVec3,
@@ -45,12 +48,58 @@ fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>) -> (DVec3, bool)
     }
 }
 
-/// The visible points of an iteration, in slot order: as many for each pixel slot as
+/// Visible points, in slot order: as many for each pixel slot as
 /// [`Settings::slots_per_pixel`](crate::layout::Settings::slots_per_pixel) says.
-pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Vec<VisiblePoint> {
+#[derive(Debug, Clone, Default)]
+pub struct Seen {
+    /// Where camera paths end.
+    pub points: Vec<VisiblePoint>,
+    /// How those scatter; empty where the scene has no glossy surfaces.
+    pub gloss: Vec<Gloss>,
+}
+
+/// The same, borrowed.
+#[derive(Debug, Clone, Copy)]
+pub struct SeenSlice<'a> {
+    pub(super) points: &'a [VisiblePoint],
+    pub(super) gloss: &'a [Gloss],
+}
+
+impl<'a> From<&'a Seen> for SeenSlice<'a> {
+    fn from(Seen { points, gloss }: &'a Seen) -> Self {
+        Self { points, gloss }
+    }
+}
+
+/// Of a scene without glossy surfaces.
+impl<'a> From<&'a [VisiblePoint]> for SeenSlice<'a> {
+    fn from(points: &'a [VisiblePoint]) -> Self {
+        Self { points, gloss: &[] }
+    }
+}
+
+/// Of a scene without glossy surfaces.
+impl<'a> From<&'a Vec<VisiblePoint>> for SeenSlice<'a> {
+    fn from(points: &'a Vec<VisiblePoint>) -> Self {
+        points.as_slice().into()
+    }
+}
+
+impl SeenSlice<'_> {
+    /// How a slot's surface scatters and the direction to the viewer, in a scene with glossy surfaces.
+    pub(super) fn reflector(&self, slot: usize) -> Option<(Reflector, DVec3)> {
+        self.gloss.get(slot).map(Reflector::from_gloss)
+    }
+}
+
+/// A slot in the making.
+type Slot = (VisiblePoint, Gloss);
+
+/// The visible points of an iteration.
+pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Seen {
     let slots_per_pixel = inputs.settings.slots_per_pixel as usize;
-    let mut visible_points = vec![nothing_seen(DVec3::ZERO); pixel_slots(inputs.settings) * slots_per_pixel];
-    visible_points
+    let mut slots = vec![nothing_seen(DVec3::ZERO); pixel_slots(inputs.settings) * slots_per_pixel];
+    slots
         .par_chunks_mut(slots_per_pixel)
         .enumerate()
         .for_each(|(pixel_slot, slots)| {
@@ -58,19 +107,40 @@ pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Vec<Visib
                 follow(inputs, pixel, iteration, slots, counts);
             }
         });
-    visible_points
+    let (points, mut gloss): (Vec<_>, Vec<_>) = slots.into_iter().unzip();
+    if !inputs.scene.features.glossy {
+        gloss = Vec::new();
+    }
+    Seen { points, gloss }
 }
 
 /// A visible point whose path met no matte surface.
-fn nothing_seen(emitted: DVec3) -> VisiblePoint {
-    VisiblePoint {
+fn nothing_seen(emitted: DVec3) -> Slot {
+    let point = VisiblePoint {
         position_object: with_word(DVec3::ZERO, NO_OBJECT),
         weight_normal: [0.0; 4],
         emitted_normal: with_word(emitted, 0),
-    }
+    };
+    (point, Gloss::zeroed())
 }
 
-fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [VisiblePoint], counts: &Counts) {
+/// The visible point of a path that ends on a surface.
+fn seen(inputs: &Inputs<'_>, branch: &Branch, surface: &Surface<'_>, facing: &Facing, reflector: Reflector) -> Slot {
+    if reflector.diffuse.max_element() == 0.0 && reflector.alpha == 0.0 {
+        return nothing_seen(branch.emitted);
+    }
+    let glossy = inputs.scene.features.glossy;
+    // The Lambertian BRDF is albedo / π.
+    let brdf = if glossy { DVec3::ONE } else { reflector.diffuse / PI };
+    let point = VisiblePoint {
+        position_object: with_word(surface.position, surface.object),
+        weight_normal: with_word(branch.throughput * brdf, encode_direction(facing.geometric_normal)),
+        emitted_normal: with_word(branch.emitted, encode_direction(facing.shading_normal)),
+    };
+    (point, reflector.to_gloss(-branch.ray.direction))
+}
+
+fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slot], counts: &Counts) {
     let settings = inputs.settings;
     let [width, _] = settings.resolution;
     let mut random = Random::of_pixel(inputs, PathKind::Camera, pixel[1] * width + pixel[0], iteration);
@@ -120,17 +190,15 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
                 };
             }
             branch.emission_seen = false;
-            if surface.material.surface == MATTE {
-                if base_color.max_element() == 0.0 {
-                    break nothing_seen(branch.emitted);
-                }
-                // The Lambertian BRDF is albedo / π.
-                let weight = branch.throughput * base_color / PI;
-                break VisiblePoint {
-                    position_object: with_word(surface.position, surface.object),
-                    weight_normal: with_word(weight, encode_direction(facing.geometric_normal)),
-                    emitted_normal: with_word(branch.emitted, encode_direction(facing.shading_normal)),
-                };
+            let (is_matte, is_glossy) = (surface.material.surface == MATTE, surface.material.surface == GLOSSY);
+            // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
+            let reflector = if is_glossy {
+                Reflector::of_material(surface.material)
+            } else {
+                Reflector::matte(base_color)
+            };
+            if is_matte || (is_glossy && reflector.alpha >= FOLLOWED_ALPHA) {
+                break seen(inputs, &branch, &surface, &facing, reflector);
             }
             if branch.depth + 1 >= settings.max_depth {
                 counts.add_truncated(1);
@@ -138,7 +206,39 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Vis
             }
             branch.depth += 1;
             branch.ignored = Some(surface.triangle);
-            let [choice, ..] = random.next4();
+            let [choice, second, third, _] = random.next4();
+            if is_glossy {
+                let p = reflector.reflection_probability(-incoming.dot(facing.shading_normal));
+                let (direction, weight) = facing.follow(&reflector, incoming, [second, third]);
+                let reflected = Branch {
+                    ray: Ray {
+                        origin: surface.origin_towards(direction),
+                        direction,
+                    },
+                    throughput: branch.throughput * weight,
+                    ..branch
+                };
+                let stopping = Reflector {
+                    alpha: 0.0,
+                    ..reflector
+                };
+                if p > 0.0 && p < 1.0 && used + pending.len() + 1 < slots.len() {
+                    pending.push(Branch {
+                        emitted: DVec3::ZERO,
+                        ..reflected
+                    });
+                } else if choice < p {
+                    branch = reflected;
+                    branch.throughput /= p;
+                    if branch.throughput.max_element() <= 0.0 {
+                        break nothing_seen(branch.emitted);
+                    }
+                    continue;
+                } else {
+                    branch.throughput /= 1.0 - p;
+                }
+                break seen(inputs, &branch, &surface, &facing, stopping);
+            }
             branch.ray.direction = if surface.material.surface == MIRROR {
                 branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
                 facing.reflect(incoming)

@@ -4,6 +4,8 @@ use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 
+use super::camera::SeenSlice;
+use super::gloss::Reflector;
 use super::sampling::decode_direction;
 use super::vector::{mean, word, xyz};
 use crate::error::{Error, Result};
@@ -23,8 +25,7 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, photon: &Photon, distance2: f32) {
-        let flux = xyz(photon.flux_direction);
+    fn add(&mut self, flux: DVec3, distance2: f32) {
         self.flux += flux;
         self.count += 1;
         self.moment += mean(flux) * f64::from(distance2);
@@ -44,6 +45,9 @@ struct Receiver {
     radius2: f32,
     object: u32,
     normal: DVec3,
+    shading_normal: DVec3,
+    /// Of a scene with glossy surfaces; and the direction to the viewer.
+    reflector: Option<(Reflector, DVec3)>,
 }
 
 fn position(position_object: [f32; 4]) -> [f32; 3] {
@@ -52,13 +56,15 @@ fn position(position_object: [f32; 4]) -> [f32; 3] {
 
 impl Receiver {
     /// `None` where the path met no matte surface.
-    fn new(point: &VisiblePoint, statistics: &Statistics) -> Option<Self> {
+    fn new(point: &VisiblePoint, statistics: &Statistics, reflector: Option<(Reflector, DVec3)>) -> Option<Self> {
         let object = word(point.position_object);
         (object != NO_OBJECT).then(|| Self {
             position: position(point.position_object),
             radius2: statistics.radius2_high,
             object,
             normal: decode_direction(word(point.weight_normal)),
+            shading_normal: decode_direction(word(point.emitted_normal)),
+            reflector,
         })
     }
 
@@ -68,25 +74,27 @@ impl Receiver {
         let here = position(photon.position_object);
         let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| here[axis] - self.position[axis]);
         let distance2 = x * x + y * y + z * z;
-        if distance2 <= self.radius2
-            && word(photon.position_object) == self.object
-            && decode_direction(word(photon.flux_direction)).dot(self.normal) < 0.0
+        let direction = decode_direction(word(photon.flux_direction));
+        if distance2 <= self.radius2 && word(photon.position_object) == self.object && direction.dot(self.normal) < 0.0
         {
-            sum.add(photon, distance2);
+            let brdf = self.reflector.map_or(DVec3::ONE, |(reflector, viewer)| {
+                reflector.brdf(self.shading_normal, viewer, -direction)
+            });
+            sum.add(xyz(photon.flux_direction) * brdf, distance2);
         }
     }
 }
 
 /// Adds to each slot what `gather` sums up for its receiver.
 fn for_each_receiver(
-    visible_points: &[VisiblePoint],
+    seen: SeenSlice<'_>,
     statistics: &[Statistics],
     gathered: &mut [Gathered],
     gather: impl Fn(&Receiver, &mut Sum) + Sync,
 ) {
-    let slots = gathered.par_iter_mut().zip(visible_points).zip(statistics);
-    slots.for_each(|((gathered, point), statistics)| {
-        if let Some(receiver) = Receiver::new(point, statistics) {
+    let slots = gathered.par_iter_mut().zip(seen.points).zip(statistics).enumerate();
+    slots.for_each(|(slot, ((gathered, point), statistics))| {
+        if let Some(receiver) = Receiver::new(point, statistics, seen.reflector(slot)) {
             let mut sum = Sum::default();
             gather(&receiver, &mut sum);
             sum.add_to(gathered);
@@ -95,13 +103,13 @@ fn for_each_receiver(
 }
 
 /// Adds to each slot the photons that it accepts, by testing every photon.
-pub fn gather_naive(
-    visible_points: &[VisiblePoint],
+pub fn gather_naive<'a>(
+    seen: impl Into<SeenSlice<'a>>,
     statistics: &[Statistics],
     photons: &[Photon],
     gathered: &mut [Gathered],
 ) {
-    for_each_receiver(visible_points, statistics, gathered, |receiver, sum| {
+    for_each_receiver(seen.into(), statistics, gathered, |receiver, sum| {
         photons.iter().for_each(|photon| receiver.gather(photon, sum));
     });
 }
@@ -110,8 +118,8 @@ pub fn gather_naive(
 ///
 /// # Errors
 /// [`Error::Config`] if there are more photons than the tree can number.
-pub fn gather_kd_tree(
-    visible_points: &[VisiblePoint],
+pub fn gather_kd_tree<'a>(
+    seen: impl Into<SeenSlice<'a>>,
     statistics: &[Statistics],
     photons: &[Photon],
     gathered: &mut [Gathered],
@@ -122,7 +130,7 @@ pub fn gather_kd_tree(
     let positions: Vec<[f32; 3]> = photons.iter().map(|photon| position(photon.position_object)).collect();
     let tree = ImmutableKdTree::new_from_slice(&positions)
         .map_err(|error| Error::Config(format!("kd-tree: {error}; try fewer --photons")))?;
-    for_each_receiver(visible_points, statistics, gathered, |receiver, sum| {
+    for_each_receiver(seen.into(), statistics, gathered, |receiver, sum| {
         tree.query(&receiver.position)
             .within::<SquaredEuclidean<f32>>(receiver.radius2 * MARGIN)
             .unsorted()

@@ -14,6 +14,7 @@ mod contact;
 mod coverage;
 mod direct;
 mod gather;
+mod gloss;
 mod intersect;
 mod light;
 mod photons;
@@ -30,10 +31,11 @@ mod vector;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-pub use camera::camera;
+pub use camera::{Seen, SeenSlice, camera};
 pub use coverage::coverage;
 pub use direct::direct;
 pub use gather::{gather_kd_tree, gather_naive};
+pub use gloss::Reflector;
 pub use intersect::{Hit, Ray, is_blocked, nearest_hit};
 pub use photons::{Batch, compact, photons};
 pub use primitives::{scan, sort};

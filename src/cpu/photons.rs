@@ -6,11 +6,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::contact::Encounter;
+use super::gloss::Reflector;
 use super::intersect::{Ray, nearest_hit};
 use super::light::{Choice, choose_light};
 use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction, triangle_point};
-use super::surface::{Boundary, MATTE, MIRROR, offset_origin, surface_at};
+use super::surface::{Boundary, GLOSSY, MATTE, MIRROR, offset_origin, surface_at};
 use super::vector::{rgb, with_word};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
@@ -106,8 +107,8 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             tint,
         } = Encounter::new(inputs, hit, incoming);
         let material = surface.material;
-        let [choice, second, survival, _] = random.next4();
-        let (direction, flux) = if material.surface == MATTE {
+        let u @ [choice, second, survival, _] = random.next4();
+        let (direction, flux) = if [MATTE, GLOSSY].contains(&material.surface) {
             // Flux is per area of the geometric surface, scattering per cosine to the shading normal: Veach, «Robust
             // Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
             let flux = path.flux * incoming.dot(facing.shading_normal) / incoming.dot(facing.geometric_normal);
@@ -123,7 +124,12 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             }
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             let outgoing = cosine_direction(facing.geometric_normal, choice, second);
-            let scattered = roulette(path.flux, flux * rgb(material.base_color), survival);
+            let (outgoing, weight) = if material.surface == GLOSSY {
+                facing.scatter(&Reflector::of_material(material), incoming, u, outgoing)
+            } else {
+                (outgoing, rgb(material.base_color))
+            };
+            let scattered = roulette(path.flux, flux * weight, survival);
             (
                 outgoing,
                 scattered.filter(|_| outgoing.dot(facing.shading_normal) > 0.0),

@@ -5,14 +5,14 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::{
-    Batch, Counts, Inputs, camera, compact, coverage, direct, fit_radius, gather_kd_tree, gather_naive, photons, reset,
-    resolve, update,
+    Batch, Counts, Inputs, Seen, camera, compact, coverage, direct, fit_radius, gather_kd_tree, gather_naive, photons,
+    reset, resolve, update,
 };
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Estimator, Limits, RenderConfig, Sizes};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
-use crate::layout::{Coverage, DirectSum, Gathered, Settings, Statistics, VisiblePoint};
+use crate::layout::{Coverage, DirectSum, Gathered, Settings, Statistics};
 use crate::radius;
 use crate::record::{Launch, Run};
 use crate::scene::{Camera, PackedScene};
@@ -29,7 +29,7 @@ pub struct Renderer {
     config: RenderConfig,
     sizes: Sizes,
     settings: Settings,
-    visible_points: Vec<VisiblePoint>,
+    seen: Seen,
     statistics: Vec<Statistics>,
     gathered: Vec<Gathered>,
     direct_sums: Vec<DirectSum>,
@@ -58,7 +58,8 @@ impl Renderer {
             storage_buffer_bytes: PHOTON_BYTES,
             loop_limit: u32::MAX,
             lanes: LANES,
-            glass: scene.features.dielectric,
+            splitting: scene.features.dielectric || scene.features.glossy,
+            glossy: scene.features.glossy,
             meshes: scene.object_grids.len() as u32,
             object_cells: scene.object_cells,
         };
@@ -73,7 +74,7 @@ impl Renderer {
                 ..settings(&config, scene, camera, limits.loop_limit)
             },
             config,
-            visible_points: Vec::new(),
+            seen: Seen::default(),
             statistics: Vec::new(),
             gathered: vec![Gathered::zeroed(); slots],
             direct_sums: vec![DirectSum::zeroed(); slots],
@@ -111,7 +112,7 @@ impl Renderer {
             config: &self.config,
         };
         let counts = Counts::default();
-        let visible_points = camera(&inputs, 0, &counts);
+        let seen = camera(&inputs, 0, &counts);
         let photons = compact(&photons(
             &inputs,
             batch_of(&self.sizes, &self.config, radius::PILOT, 0),
@@ -119,11 +120,11 @@ impl Renderer {
         ));
         // The pilot is a batch; the densities of the whole iteration's photons are higher.
         let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
-        let automatic = radius::automatic(&visible_points, &photons);
+        let automatic = radius::automatic(&seen.points, &photons);
         self.settings.initial_radius2 = automatic.radius2 * share;
         self.statistics = vec![reset(self.settings.initial_radius2); slots];
         for _ in 0..radius::FITS {
-            gather_kd_tree(&visible_points, &self.statistics, &photons, &mut self.gathered)?;
+            gather_kd_tree(&seen, &self.statistics, &photons, &mut self.gathered)?;
             let wanted = automatic.photons as f32 * share;
             fit_radius(wanted, &mut self.gathered, &mut self.statistics);
         }
@@ -145,35 +146,35 @@ impl Backend for Renderer {
             run: Run::default(),
         };
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
-            self.visible_points = clock.time("camera", || camera(&inputs, iteration, &counts));
+            self.seen = clock.time("camera", || camera(&inputs, iteration, &counts));
         }
         for batch in 0..self.sizes.batches(self.config.photons) {
             let batch = batch_of(&self.sizes, &self.config, iteration, batch);
             let lanes = clock.time("photons", || photons(&inputs, batch, &counts));
             let photons = clock.time("compact", || compact(&lanes));
-            let (points, statistics, gathered) = (&self.visible_points, &self.statistics, &mut self.gathered);
+            let (seen, statistics, gathered) = (&self.seen, &self.statistics, &mut self.gathered);
             match METHODS[self.config.gather.unwrap_or_else(default_cpu_method)].runs {
                 Runs::CpuNaive => {
-                    clock.time("gather_naive", || gather_naive(points, statistics, &photons, gathered));
+                    clock.time("gather_naive", || gather_naive(seen, statistics, &photons, gathered));
                 }
                 _ => clock.time("gather_kd_tree", || {
-                    gather_kd_tree(points, statistics, &photons, gathered)
+                    gather_kd_tree(seen, statistics, &photons, gathered)
                 })?,
             }
             self.counters.photons_stored += photons.len() as u64;
         }
         clock.time("direct", || {
-            direct(&inputs, iteration, &self.visible_points, &counts, &mut self.direct_sums)
+            direct(&inputs, iteration, &self.seen, &counts, &mut self.direct_sums)
         });
         if self.config.estimator == Estimator::Sppm {
-            let (points, statistics) = (&self.visible_points, &self.statistics);
+            let (points, statistics) = (&self.seen.points, &self.statistics);
             clock.time("coverage", || {
                 coverage(&inputs, iteration, points, statistics, &mut self.coverage)
             });
         }
         clock.time("update", || {
             update(
-                &self.visible_points,
+                &self.seen.points,
                 self.config.alpha,
                 &counts,
                 &mut self.gathered,

@@ -1,8 +1,11 @@
 //! Where a ray meets a surface and how it goes on: `surface_at` and `offset_origin` of `glsl/shared/scene.glsl`, and
 //! `glsl/shared/bsdf.glsl`, in f64.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
+use super::gloss::Reflector;
 use super::sampling::decode_direction;
 use super::vector::{rgb, word, xyz};
 use crate::layout::{Material, SMOOTH_SHADED, ShadingTriangle};
@@ -14,6 +17,8 @@ pub(super) const MATTE: u32 = 0;
 pub(super) const MIRROR: u32 = 1;
 /// [`Material::surface`] of glass.
 pub(super) const DIELECTRIC: u32 = 2;
+/// [`Material::surface`] of microfacets over a Lambertian base.
+pub(super) const GLOSSY: u32 = 3;
 
 /// A point of a triangle.
 #[derive(Clone, Copy)]
@@ -129,6 +134,46 @@ impl Facing {
         } else {
             about(self.geometric_normal).normalize()
         }
+    }
+
+    /// Where a path goes that follows what a boundary of microfacets reflects, and its weight: none of it where that would
+    /// fly into the surface.
+    pub fn follow(&self, reflector: &Reflector, incoming: DVec3, u: [f64; 2]) -> (DVec3, DVec3) {
+        let direction = if reflector.is_smooth() {
+            self.reflect(incoming)
+        } else {
+            reflector.reflected_direction(self.shading_normal, -incoming, u)
+        };
+        let weight = if direction.dot(self.geometric_normal) > 0.0 {
+            reflector.reflected_weight(self.shading_normal, -incoming, direction)
+        } else {
+            DVec3::ZERO
+        };
+        (direction, weight)
+    }
+
+    /// Where a glossy surface scatters a photon to, instead of the cosine-distributed `outgoing` or as that says, and the
+    /// part of the flux that goes there.
+    pub fn scatter(&self, reflector: &Reflector, incoming: DVec3, u: [f64; 4], outgoing: DVec3) -> (DVec3, DVec3) {
+        let (n, v) = (self.shading_normal, -incoming);
+        let nv = n.dot(v);
+        let p = reflector.reflection_probability(nv);
+        let reflects = u[3] < p;
+        if reflector.is_smooth() {
+            return if reflects {
+                (self.reflect(incoming), reflector.fresnel(nv) / p)
+            } else {
+                (outgoing, PI / (1.0 - p) * reflector.brdf(n, v, outgoing))
+            };
+        }
+        let outgoing = if reflects {
+            reflector.reflected_direction(n, v, [u[0], u[1]])
+        } else {
+            outgoing
+        };
+        let cosine = outgoing.dot(self.geometric_normal).max(0.0);
+        let density = (1.0 - p) * cosine / PI + p * reflector.reflected_density(n, v, outgoing);
+        (outgoing, reflector.brdf(n, v, outgoing) * (cosine / density.max(1e-20)))
     }
 
     /// Reflectance of a mirror with this base colour: Schlick's approximation, as glTF 2.0, appendix B, has it.

@@ -129,7 +129,10 @@ fn dealing(groups: u32) -> u32 {
 }
 
 fn gather_stage(shader: &'static Shader, threads: u32, sizes: &Sizes) -> StageDesc {
-    StageDesc::new(shader, threads).constants(vec![("COUNT_TESTS", u32::from(sizes.probe.count_tests))])
+    StageDesc::new(shader, threads).constants(vec![
+        ("COUNT_TESTS", u32::from(sizes.probe.count_tests)),
+        ("GLOSSY", u32::from(sizes.glossy)),
+    ])
 }
 
 /// The paper's photon sorting: one map a mesh, filled by an atomic counter a mesh.

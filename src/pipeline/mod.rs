@@ -81,7 +81,8 @@ impl Renderer {
             storage_buffer_bytes: buffer_bytes,
             loop_limit: loop_budget(device.loop_limit()),
             lanes: if device.summary().kind == "cpu" { 4096 } else { 1 << 18 },
-            glass: scene.features.dielectric,
+            splitting: scene.features.dielectric || scene.features.glossy,
+            glossy: scene.features.glossy,
             meshes: scene.object_grids.len() as u32,
             object_cells: scene.object_cells,
         };

@@ -3,9 +3,11 @@
 use crate::layout::{Material, ShadingTriangle, TOUCHED};
 
 /// [`Material::surface`] of a mirror.
-const MIRROR: u32 = 1;
+pub(super) const MIRROR: u32 = 1;
 /// [`Material::surface`] of a dielectric.
 pub(super) const DIELECTRIC: u32 = 2;
+/// [`Material::surface`] of what reflects as microfacets do, over a Lambertian base.
+pub(super) const GLOSSY: u32 = 3;
 
 /// What a scene has. Each is a specialisation constant of the stages that trace rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -14,6 +16,8 @@ pub struct SceneFeatures {
     pub mirror: bool,
     /// Boundaries of dielectrics.
     pub dielectric: bool,
+    /// Microfacets.
+    pub glossy: bool,
     /// Boundaries of dielectrics that lie on faces of other objects.
     pub contact: bool,
 }
@@ -23,6 +27,7 @@ impl SceneFeatures {
     pub const ALL: Self = Self {
         mirror: true,
         dielectric: true,
+        glossy: true,
         contact: true,
     };
 
@@ -33,16 +38,18 @@ impl SceneFeatures {
             let surface = materials[triangle.material as usize].surface;
             features.mirror |= surface == MIRROR;
             features.dielectric |= surface == DIELECTRIC;
+            features.glossy |= surface == GLOSSY;
             features.contact |= triangle.flags & TOUCHED != 0;
         }
         features
     }
 
     /// Each feature's constant in the kernels, and its value.
-    pub fn constants(self) -> [(&'static str, bool); 3] {
+    pub fn constants(self) -> [(&'static str, bool); 4] {
         [
             ("MIRRORS", self.mirror),
             ("DIELECTRICS", self.dielectric),
+            ("GLOSSY", self.glossy),
             ("CONTACT", self.contact),
         ]
     }

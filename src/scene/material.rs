@@ -6,8 +6,8 @@ use gltf::json::extensions::material::Volume;
 use gltf::json::material::AlphaMode;
 use gltf::json::validation::Checked;
 
-use super::diagnostic::{Check, Warnings, damaged, label, list, quote, shorten};
-use super::{Material, Surface};
+use super::diagnostic::{Check, Warnings, damaged, label, list, shorten};
+use super::{Gloss, Material, Surface};
 
 /// Index of refraction where the file gives none.
 const DEFAULT_IOR: f32 = 1.5;
@@ -24,7 +24,6 @@ pub(super) fn materials(root: &json::Root, used: &[bool], warnings: &mut Warning
         ..Default::default()
     };
     let mut materials = Vec::with_capacity(root.materials.len() + 1);
-    let mut with_specular_lobe = Vec::new();
     for (index, json) in root.materials.iter().chain([&default]).enumerate() {
         let mut reader = Reader {
             json,
@@ -36,31 +35,10 @@ pub(super) fn materials(root: &json::Root, used: &[bool], warnings: &mut Warning
             for warning in reader.warnings {
                 warnings.push(format!("{label}: {warning}"));
             }
-            if has_specular_lobe(json, &material) {
-                with_specular_lobe.push(quote(&material.name));
-            }
         }
         materials.push(material);
     }
-    if !with_specular_lobe.is_empty() {
-        warnings.push(format!(
-            "the specular lobe over the base colour isn't supported yet and is left out of {} \
-             (a KHR_materials_specular factor of 0 turns it off)",
-            list(&with_specular_lobe)
-        ));
-    }
     Ok(materials)
-}
-
-/// Whether glTF gives the material a dielectric's reflection on top of what is rendered as matte.
-fn has_specular_lobe(json: &json::Material, material: &Material) -> bool {
-    let specular = json
-        .extensions
-        .as_ref()
-        .and_then(|extensions| extensions.specular.as_ref());
-    let is_off = specular.is_some_and(|specular| specular.specular_factor.0 == 0.0);
-    let is_metal = json.pbr_metallic_roughness.metallic_factor.0 >= 1.0;
-    material.surface == Surface::Matte && !is_off && !is_metal
 }
 
 /// One material with the warnings about it.
@@ -100,7 +78,7 @@ impl Reader<'_> {
         let transmission = transmission.map_or(0.0, |transmission| transmission.transmission_factor.0);
         let [transmission] = self.fractions("transmissionFactor", [transmission])?;
         let ior = self.ior()?;
-        self.check_specular()?;
+        let (specular, specular_color) = self.specular()?;
         self.check_volume()?;
 
         if metallic == 1.0 {
@@ -110,19 +88,23 @@ impl Reader<'_> {
             if roughness == 0.0 {
                 return Ok(Surface::Mirror);
             }
+        } else if transmission > 0.0 && metallic > 0.0 {
             self.warn(format!(
-                "metallic with roughness {roughness} isn't supported yet; it is rendered matte in its base colour"
-            ));
-            return Ok(Surface::Matte);
-        }
-        if metallic > 0.0 {
-            let surface = if transmission > 0.0 { "glass" } else { "matte" };
-            self.warn(format!(
-                "metallicFactor {metallic}, between 0 and 1, isn't supported yet; it is rendered {surface}"
+                "metallicFactor {metallic}, between 0 and 1, with transmission isn't supported yet; it is rendered glass"
             ));
         }
-        if transmission == 0.0 {
-            return Ok(Surface::Matte);
+        if transmission == 0.0 || metallic == 1.0 {
+            if metallic == 0.0 && specular == 0.0 {
+                return Ok(Surface::Matte);
+            }
+            // KHR_materials_ior and KHR_materials_specular.
+            let of_ior = ((ior - 1.0) / (ior + 1.0)).powi(2);
+            return Ok(Surface::Glossy(Gloss {
+                metallic,
+                roughness,
+                specular_f0: (specular_color * of_ior).min(Vec3::ONE) * specular,
+                specular_f90: specular,
+            }));
         }
         self.warn_of_glass(transmission, roughness);
         Ok(Surface::Dielectric { ior })
@@ -187,14 +169,14 @@ impl Reader<'_> {
         }
     }
 
-    fn check_specular(&mut self) -> Check<()> {
+    /// Factor and colour of KHR_materials_specular.
+    fn specular(&mut self) -> Check<(f32, Vec3)> {
         let Some(specular) = self.extension(|extensions| extensions.specular.as_ref()) else {
-            return Ok(());
+            return Ok((1.0, Vec3::ONE));
         };
         let (factor, color) = (specular.specular_factor.0, specular.specular_color_factor.0);
-        self.fractions("specularFactor", [factor])?;
-        not_negative("specularColorFactor", color)?;
-        Ok(())
+        let [factor] = self.fractions("specularFactor", [factor])?;
+        Ok((factor, not_negative("specularColorFactor", color)?.into()))
     }
 
     fn check_volume(&mut self) -> Check<()> {

@@ -58,6 +58,21 @@ pub enum Surface {
         /// Index of refraction inside, relative to vacuum.
         ior: f32,
     },
+    /// A Lambertian base under a boundary of microfacets: glTF 2.0, appendix B.
+    Glossy(Gloss),
+}
+
+/// How a boundary of microfacets reflects.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Gloss {
+    /// How far the surface is a metal, 0 ..= 1.
+    pub metallic: f32,
+    /// Its square is GGX's α; 0 ..= 1.
+    pub roughness: f32,
+    /// Reflectance at normal incidence where it is no metal, linear RGB.
+    pub specular_f0: Vec3,
+    /// Reflectance at grazing incidence where it is no metal.
+    pub specular_f90: f32,
 }
 
 /// A glTF material, reduced to what is supported.

@@ -2,9 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::features::{DIELECTRIC, SceneFeatures};
+use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::object_grid::object_grids;
-use super::{Scene, Surface, bvh, contact};
+use super::{Gloss, Scene, Surface, bvh, contact};
 use crate::layout::{
     BvhRecord, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, SMOOTH_SHADED, ShadingTriangle, TOUCHED,
 };
@@ -120,20 +120,24 @@ fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTr
 }
 
 fn material(material: &super::Material) -> Material {
-    let (surface, ior) = match material.surface {
-        Surface::Matte => (0, 1.0),
-        Surface::Mirror => (1, 1.0),
-        Surface::Dielectric { ior } => (DIELECTRIC, ior),
-    };
+    let (mut surface, mut ior, mut gloss) = (0, 1.0, Gloss::default());
+    match material.surface {
+        Surface::Matte => {}
+        Surface::Mirror => surface = MIRROR,
+        Surface::Dielectric { ior: inside } => (surface, ior) = (DIELECTRIC, inside),
+        Surface::Glossy(of_surface) => (surface, gloss) = (GLOSSY, of_surface),
+    }
     Material {
         base_color: material.base_color.to_array(),
         surface,
         emission: material.emission.to_array(),
         ior,
         double_sided: material.double_sided.into(),
-        padding0: 0,
-        padding1: 0,
-        padding2: 0,
+        metallic: gloss.metallic,
+        roughness: gloss.roughness,
+        padding: 0,
+        specular_f0: gloss.specular_f0.to_array(),
+        specular_f90: gloss.specular_f90,
     }
 }
 

@@ -74,6 +74,18 @@ impl Bench {
         }
     }
 
+    /// The visible points that the device found last.
+    pub fn seen(&mut self) -> cpu::Seen {
+        cpu::Seen {
+            points: self.download(BufferId::VisiblePoints),
+            gloss: if self.scene.features.glossy {
+                self.download(BufferId::GlossOf)
+            } else {
+                Vec::new()
+            },
+        }
+    }
+
     /// What a buffer of the device holds.
     pub fn download<T: bytemuck::AnyBitPattern>(&mut self, id: BufferId) -> Vec<T> {
         download(&mut self.renderer, id)

@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Probe, RenderConfig};
-use ppm_vk::cpu::{self, Counts};
+use ppm_vk::cpu::{self, Counts, Seen};
 use ppm_vk::gather::{self, METHODS};
 use ppm_vk::layout::{Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
 use ppm_vk::record::Recording;
@@ -35,6 +35,19 @@ fn assert_methods_agree(
     statistics: &[Statistics],
     photons: &[Photon],
 ) -> Vec<u32> {
+    let gloss = Vec::new();
+    let points = points.to_vec();
+    assert_methods_agree_on(bench, case, &Seen { points, gloss }, statistics, photons)
+}
+
+fn assert_methods_agree_on(
+    bench: &mut Bench,
+    case: &str,
+    seen: &Seen,
+    statistics: &[Statistics],
+    photons: &[Photon],
+) -> Vec<u32> {
+    let points = &seen.points;
     assert_eq!(
         points.len(),
         bench.renderer.sizes().slots() as usize,
@@ -45,7 +58,7 @@ fn assert_methods_agree(
         "more photons than the buffers hold"
     );
     let mut expected = vec![Gathered::zeroed(); points.len()];
-    cpu::gather_naive(points, statistics, photons, &mut expected);
+    cpu::gather_naive(seen, statistics, photons, &mut expected);
     let mut updated = statistics.to_vec();
     cpu::update(
         points,
@@ -56,6 +69,9 @@ fn assert_methods_agree(
     );
 
     bench.upload(BufferId::VisiblePoints, points);
+    if !seen.gloss.is_empty() {
+        bench.upload(BufferId::GlossOf, &seen.gloss);
+    }
     bench.upload(BufferId::Photons, photons);
     bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);
     for (index, method) in METHODS.iter().enumerate() {
@@ -150,7 +166,7 @@ fn all_methods_agree_in_every_scene_at_any_radius_early_and_late() {
             while bench.renderer.iterations() < iterations {
                 bench.renderer.iterate().expect("an iteration");
             }
-            let (points, photons): (Vec<VisiblePoint>, _) = (bench.download(BufferId::VisiblePoints), bench.photons());
+            let (seen, photons) = (bench.seen(), bench.photons());
             let now: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
             for factor in [0.25f32, 1.0, 4.0] {
                 let scaled = |s: &Statistics| Statistics {
@@ -159,7 +175,7 @@ fn all_methods_agree_in_every_scene_at_any_radius_early_and_late() {
                 };
                 let statistics: Vec<Statistics> = now.iter().map(scaled).collect();
                 let case = format!("{scene} after {iterations} iterations, {factor} times the radii");
-                assert_methods_agree(&mut bench, &case, &points, &statistics, &photons);
+                assert_methods_agree_on(&mut bench, &case, &seen, &statistics, &photons);
             }
             bench.upload(BufferId::StatisticsOf, &now);
         }
@@ -206,6 +222,14 @@ fn all_methods_agree_on_traced_photons_at_any_radius() {
     println!("mean M at a quarter of, at, and at four times the automatic radius: {means:?}");
     assert!(means[1] > 4.0 && means[1] < 128.0, "mean M {means:?}");
     assert!(means[0] < means[1] && means[1] < means[2], "mean M {means:?}");
+}
+
+#[test]
+fn all_methods_agree_on_what_glossy_surfaces_scatter_to_the_viewer() {
+    let mut bench = Bench::new("glossy", small());
+    let (seen, photons) = (bench.seen(), bench.photons());
+    let statistics = with_radius(seen.points.len(), bench.settings.initial_radius2);
+    assert_methods_agree_on(&mut bench, "glossy surfaces", &seen, &statistics, &photons);
 }
 
 #[test]

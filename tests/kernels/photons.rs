@@ -102,6 +102,11 @@ fn photons_that_pass_glass_and_mirrors_land_where_the_cpus_do() {
 }
 
 #[test]
+fn photons_that_glossy_surfaces_scatter_land_where_the_cpus_do() {
+    assert_photons_agree("glossy", photons_carry_all_light(), 1e-4, 0.995, 7000);
+}
+
+#[test]
 fn photons_of_indirect_light_leave_out_the_first_matte_surface() {
     assert_photons_agree("cornell-spheres", small(), 1e-4, 0.995, 4000);
 }

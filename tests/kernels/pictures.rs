@@ -53,6 +53,8 @@ fn both_backends_render_the_same_picture() {
         ("cornell-spheres", Estimator::Sppm, Direct::Light),
         ("cornell-spheres", Estimator::Ppm, Direct::Photons),
         ("pool", Estimator::Sppm, Direct::Light),
+        ("glossy", Estimator::Sppm, Direct::Light),
+        ("glossy", Estimator::Ppm, Direct::Photons),
     ] {
         let config = RenderConfig {
             estimator,

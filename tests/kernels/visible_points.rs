@@ -6,8 +6,8 @@
 //! way: those are the few that may differ.
 
 use ppm_vk::config::{Direct, Estimator, RenderConfig, Sampler};
-use ppm_vk::cpu::{self, Counts};
-use ppm_vk::layout::{DirectSum, Light, VisiblePoint};
+use ppm_vk::cpu::{self, Counts, Seen};
+use ppm_vk::layout::{DirectSum, Gloss, Light};
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
@@ -20,12 +20,23 @@ fn angle(a: f32, b: f32) -> f64 {
     cpu::decode_direction(a.to_bits()).angle_between(cpu::decode_direction(b.to_bits()))
 }
 
+fn same_gloss(found: &Gloss, expected: &Gloss) -> bool {
+    let near = |a: [f32; 4], b: [f32; 4]| xyz(a).distance(xyz(b)) <= 1e-6;
+    near(found.diffuse_viewer, expected.diffuse_viewer)
+        && near(found.f0_f90_alpha, expected.f0_f90_alpha)
+        && found.f0_f90_alpha[3].to_bits() == expected.f0_f90_alpha[3].to_bits()
+        && angle(found.diffuse_viewer[3], expected.diffuse_viewer[3]) < 1.5e-4
+}
+
 fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize) {
     let what = format!("visible points of {name}, {:?}", config.estimator);
     let mut bench = Bench::new(name, config);
-    let found: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
+    let Seen { points: found, gloss } = bench.seen();
     let counts = Counts::default();
-    let expected = cpu::camera(&bench.inputs(), 0, &counts);
+    let Seen {
+        points: expected,
+        gloss: expected_gloss,
+    } = cpu::camera(&bench.inputs(), 0, &counts);
     assert_eq!(found.len(), expected.len(), "{what}: slots");
     let (mut places, mut seen) = (Agreement::default(), Agreement::default());
     for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
@@ -43,7 +54,8 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize) {
             // A reflectance is the square of a difference, which may be small, and steep next to the critical angle.
             let same = weight.distance(expected_weight) <= 1e-4 * expected_weight.length()
                 && emitted.0.distance(emitted.1) <= 1e-5 * emitted.1.length()
-                && turned < 1.5e-4;
+                && turned < 1.5e-4
+                && (gloss.is_empty() || same_gloss(&gloss[slot], &expected_gloss[slot]));
             seen.note(same, || {
                 format!(
                     "slot {slot}: weights {weight} {expected_weight}, emitted {emitted:?}, normals {turned:e} rad apart"
@@ -57,7 +69,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize) {
 
 #[test]
 fn camera_paths_end_where_the_cpus_end() {
-    for name in ["cornell-spheres", "ring"] {
+    for name in ["cornell-spheres", "ring", "glossy"] {
         assert_camera_agrees(name, small(), 3000);
     }
 }
@@ -92,6 +104,7 @@ fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
     let constants = vec![
         ("SAMPLE_LIGHTS", u32::from(bench.config.direct == Direct::Light)),
         ("SAMPLER", bench.config.sampler as u32),
+        ("GLOSSY", u32::from(bench.scene.features.glossy)),
     ];
     recording.dispatch(
         StageDesc::new(&shaders::DIRECT, slots)
@@ -104,16 +117,16 @@ fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
 
 /// How the device's radiance agrees with the CPU's at the very same visible points.
 fn compare_direct(bench: &mut Bench, tolerance: f64) -> Agreement {
-    let visible_points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
+    let seen = bench.seen();
     let found = direct_on_device(bench);
     let mut expected = vec![
         DirectSum {
             high: [0.0; 4],
             low: [0.0; 4]
         };
-        visible_points.len()
+        seen.points.len()
     ];
-    cpu::direct(&bench.inputs(), 0, &visible_points, &Counts::default(), &mut expected);
+    cpu::direct(&bench.inputs(), 0, &seen, &Counts::default(), &mut expected);
     let mut agreement = Agreement::default();
     for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
         let (found, expected) = (xyz(found.high) + xyz(found.low), xyz(expected.high) + xyz(expected.low));
@@ -129,7 +142,12 @@ fn compare_direct(bench: &mut Bench, tolerance: f64) -> Agreement {
 
 #[test]
 fn direct_light_agrees_at_the_same_visible_points() {
-    for (name, least) in [("cornell-spheres", 2500), ("ring", 2000), ("furnace-closed", 4000)] {
+    for (name, least) in [
+        ("cornell-spheres", 2500),
+        ("ring", 2000),
+        ("furnace-closed", 4000),
+        ("glossy", 2500),
+    ] {
         let mut bench = Bench::new(name, small());
         // Light that grazes a surface has a cosine of which rounding is a larger part.
         compare_direct(&mut bench, 1e-4).assert(&format!("direct light in {name}"), 0.995, least);

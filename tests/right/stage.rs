@@ -122,7 +122,7 @@ pub fn lost_at_rims(subject: &Subject, config: &RenderConfig) -> f64 {
     let radius = f64::from(settings.initial_radius2).sqrt();
     let mut lost = 0.0;
     for iteration in 0..ITERATIONS {
-        for point in cpu::camera(&inputs, iteration, &Counts::default()) {
+        for point in cpu::camera(&inputs, iteration, &Counts::default()).points {
             let [x, y, z, object] = point.position_object;
             if object.to_bits() == NO_OBJECT {
                 continue;

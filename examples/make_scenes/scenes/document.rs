@@ -41,6 +41,16 @@ pub fn mirror(name: &str, [r, g, b]: [f64; 3]) -> Value {
     })
 }
 
+/// A surface of microfacets.
+pub fn metallic_roughness(name: &str, [r, g, b]: [f64; 3], metallic: f64, roughness: f64) -> Value {
+    json!({
+        "name": name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [r, g, b, 1.0], "metallicFactor": metallic, "roughnessFactor": roughness
+        }
+    })
+}
+
 /// A smooth, clear dielectric; meshes that have it must be closed.
 pub fn clear(name: &str, ior: f64) -> Value {
     json!({

@@ -3,7 +3,7 @@
 mod document;
 mod mesh;
 
-use document::{Document, File, clear, emitting, light, matte, mirror, one_sided};
+use document::{Document, File, clear, emitting, light, matte, metallic_roughness, mirror, one_sided};
 use glam::{DVec3, dvec3};
 use mesh::Mesh;
 
@@ -17,6 +17,7 @@ pub fn all() -> Vec<File> {
     [
         cornell(),
         cornell_spheres(),
+        glossy(),
         ring(),
         pool("pool", false),
         pool("pool-tiles", true),
@@ -58,6 +59,25 @@ fn cornell_spheres() -> Document {
         .object("mirror-sphere", &sphere, mirror)
         .at([-0.45, 0.3805, -0.35]);
     scene.object("glass-sphere", &sphere, glass).at([0.42, 0.3805, 0.35]);
+    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
+    scene
+}
+
+/// The same room with spheres of satin and of polished metal and of plastic, rough and smooth.
+fn glossy() -> Document {
+    let mut scene = cornell_room("glossy");
+    let materials = [
+        metallic_roughness("satin", [0.95, 0.7, 0.4], 1.0, 0.5),
+        metallic_roughness("polished", [0.9, 0.9, 0.92], 1.0, 0.2),
+        metallic_roughness("plastic", [0.15, 0.3, 0.7], 0.0, 0.35),
+        metallic_roughness("lacquer", [0.6, 0.08, 0.06], 0.0, 0.0),
+    ];
+    let sphere = Mesh::icosphere(0.3, 4);
+    let places = [[-0.6, -0.4], [0.1, -0.55], [-0.25, 0.35], [0.5, 0.25]];
+    for (material, [x, z]) in materials.into_iter().zip(places) {
+        let material = scene.material(material);
+        scene.object("sphere", &sphere, material).at([x, 0.3005, z]);
+    }
     scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
     scene
 }

@@ -1,0 +1,111 @@
+// Glossy reflection as glTF 2.0, appendix B, has it: a Lambertian base under a boundary of GGX microfacets with
+// height-correlated masking (Heitz, «Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs», JCGT 3(2), 2014)
+// and Schlick's Fresnel. v and l are unit vectors to the viewer and to the light. Include after sampling.glsl.
+
+layout(constant_id = 9) const bool GLOSSY = false; // the scene has glossy surfaces
+
+// Below this α a boundary is a mirror.
+const float SMOOTH_ALPHA = 1e-3;
+// Below this α camera paths follow reflections; photons gathered on such a narrow lobe would be noise.
+const float FOLLOWED_ALPHA = 0.1;
+
+struct Reflector {
+    vec3 diffuse; // albedo of the base
+    vec3 f0;      // reflectance of the boundary at normal and at grazing incidence
+    float f90;
+    float alpha;
+};
+
+// How a visible point's surface scatters.
+struct Gloss {
+    vec4 diffuse_viewer; // w: uint bits, octahedral v
+    vec4 f0_f90_alpha;   // w: uint bits, two f16: f90 and α, α = 0 where the path followed the reflection itself
+};
+
+#define GLOSS(i) Gloss(TEXEL(GlossOf, 2u * (i)), TEXEL(GlossOf, 2u * (i) + 1u))
+
+Reflector reflector_of(Gloss gloss) {
+    vec2 rest = unpackHalf2x16(floatBitsToUint(gloss.f0_f90_alpha.w));
+    return Reflector(gloss.diffuse_viewer.rgb, gloss.f0_f90_alpha.rgb, rest.x, rest.y);
+}
+
+Gloss gloss_of(Reflector reflector, vec3 v) {
+    uint rest = packHalf2x16(vec2(reflector.f90, reflector.alpha));
+    return Gloss(vec4(reflector.diffuse, uintBitsToFloat(encode_direction(v))),
+                 vec4(reflector.f0, uintBitsToFloat(rest)));
+}
+
+vec3 fresnel(Reflector reflector, float cosine) {
+    float m = clamp(1.0 - cosine, 0.0, 1.0);
+    float m2 = m * m;
+    return reflector.f0 + (reflector.f90 - reflector.f0) * (m2 * m2 * m);
+}
+
+// Density of microfacet normals. The sine comes from the cross product: 1 − cos² of a small angle is rounding.
+float ggx(float alpha, vec3 n, vec3 h) {
+    vec3 sine = cross(n, h);
+    float cosine = dot(n, h);
+    float a2 = alpha * alpha;
+    float d = dot(sine, sine) + a2 * cosine * cosine;
+    return a2 / (PI * d * d);
+}
+
+// Λ's square root: masking of a direction at this cosine is 2 cos / (cos + root).
+float masking_root(float alpha, float cosine) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * cosine * cosine);
+}
+
+// The BRDF, 1/sr, without what a smooth boundary mirrors.
+vec3 brdf(Reflector reflector, vec3 n, vec3 v, vec3 l) {
+    float nv = dot(n, v);
+    float nl = dot(n, l);
+    vec3 h = normalize(v + l);
+    vec3 f = fresnel(reflector, dot(v, h));
+    float alpha = max(reflector.alpha, SMOOTH_ALPHA);
+    float visibility = 0.5 / (nl * masking_root(alpha, nv) + nv * masking_root(alpha, nl));
+    float lobe = reflector.alpha < SMOOTH_ALPHA ? 0.0 : ggx(alpha, n, h) * visibility;
+    return nv > 0.0 && nl > 0.0 ? (1.0 - f) * reflector.diffuse * (1.0 / PI) + f * lobe : vec3(0.0);
+}
+
+// Share of the samples that go to the boundary's reflection: at least a quarter, for what it mirrors may be bright.
+float reflection_probability(Reflector reflector, float nv) {
+    vec3 f = fresnel(reflector, nv);
+    float reflected = max(f.r, max(f.g, f.b));
+    float under = max(reflector.diffuse.r, max(reflector.diffuse.g, reflector.diffuse.b)) * (1.0 - reflected);
+    return reflected <= 0.0 ? 0.0 : (under <= 0.0 ? 1.0 : max(reflected / (reflected + under), 0.25));
+}
+
+// A reflected direction by the normals that v sees: Dupuy and Benyoub, «Sampling Visible GGX Normals with Spherical Caps»,
+// Computer Graphics Forum 42(8), 2023.
+vec3 reflected_direction(float alpha, vec3 n, vec3 v, vec2 u) {
+    mat3 frame = basis(n);
+    vec3 local = v * frame;
+    vec3 stretched = normalize(vec3(alpha * local.xy, local.z));
+    float phi = 2.0 * PI * u.x;
+    float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
+    float sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
+    vec3 cap = vec3(sine * cos(phi), sine * sin(phi), z) + stretched;
+    vec3 h = normalize(frame * normalize(vec3(alpha * cap.xy, max(cap.z, 1e-6))));
+    return normalize(2.0 * dot(v, h) * h - v);
+}
+
+// Its density per solid angle.
+float reflected_density(float alpha, vec3 n, vec3 v, vec3 l) {
+    float nv = max(dot(n, v), 1e-6);
+    return ggx(alpha, n, normalize(v + l)) * 0.5 / (nv + masking_root(alpha, nv));
+}
+
+// BRDF · cos / density of a direction from `reflected_direction`, or of a mirror's.
+vec3 reflected_weight(Reflector reflector, vec3 n, vec3 v, vec3 l) {
+    float nv = dot(n, v);
+    float nl = dot(n, l);
+    if (reflector.alpha < SMOOTH_ALPHA) {
+        return fresnel(reflector, nv);
+    }
+    float root_v = masking_root(reflector.alpha, nv);
+    float root_l = masking_root(reflector.alpha, nl);
+    // G2 / G1(v)
+    float masking = nl * (nv + root_v) / (nl * root_v + nv * root_l);
+    return nl > 0.0 ? fresnel(reflector, dot(v, normalize(v + l))) * masking : vec3(0.0);
+}

@@ -1,0 +1,154 @@
+//! Glossy reflection as glTF 2.0, appendix B, has it: `glsl/shared/gloss.glsl` in f64, which cites the sources.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use half::f16;
+
+use super::sampling::{basis, decode_direction, encode_direction};
+use super::vector::{rgb, with_word, word, xyz};
+use crate::layout::{Gloss, Material};
+
+/// Below this α a boundary is a mirror.
+pub const SMOOTH_ALPHA: f64 = 1e-3;
+/// Below this α camera paths follow reflections.
+pub(super) const FOLLOWED_ALPHA: f64 = 0.1;
+
+/// A Lambertian base under a boundary of microfacets. `v` and `l` are unit vectors to the viewer and to the light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reflector {
+    /// Albedo of the base.
+    pub diffuse: DVec3,
+    /// Reflectance of the boundary at normal incidence.
+    pub f0: DVec3,
+    /// At grazing incidence.
+    pub f90: f64,
+    /// GGX's α.
+    pub alpha: f64,
+}
+
+impl Reflector {
+    /// A glossy material's.
+    pub(super) fn of_material(material: &Material) -> Self {
+        let (base, metallic) = (rgb(material.base_color), f64::from(material.metallic));
+        Self {
+            diffuse: base * (1.0 - metallic),
+            f0: rgb(material.specular_f0).lerp(base, metallic),
+            f90: f64::from(material.specular_f90) * (1.0 - metallic) + metallic,
+            alpha: f64::from(material.roughness).powi(2),
+        }
+    }
+
+    /// A Lambertian one.
+    pub(super) fn matte(albedo: DVec3) -> Self {
+        Self {
+            diffuse: albedo,
+            f0: DVec3::ZERO,
+            f90: 0.0,
+            alpha: 0.0,
+        }
+    }
+
+    /// What a visible point keeps, and the direction to the viewer.
+    pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
+        let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
+        let rest = word(gloss.f0_f90_alpha);
+        let reflector = Self {
+            diffuse: xyz(gloss.diffuse_viewer),
+            f0: xyz(gloss.f0_f90_alpha),
+            f90: half(rest),
+            alpha: half(rest >> 16),
+        };
+        (reflector, decode_direction(word(gloss.diffuse_viewer)))
+    }
+
+    pub(super) fn to_gloss(self, v: DVec3) -> Gloss {
+        let half = |value: f64| u32::from(f16::from_f64(value).to_bits());
+        let rest = half(self.f90) | half(self.alpha) << 16;
+        Gloss {
+            diffuse_viewer: with_word(self.diffuse, encode_direction(v)),
+            f0_f90_alpha: with_word(self.f0, rest),
+        }
+    }
+
+    /// Reflectance of the boundary.
+    pub fn fresnel(&self, cosine: f64) -> DVec3 {
+        self.f0 + (DVec3::splat(self.f90) - self.f0) * (1.0 - cosine).clamp(0.0, 1.0).powi(5)
+    }
+
+    pub(super) fn is_smooth(&self) -> bool {
+        self.alpha < SMOOTH_ALPHA
+    }
+
+    fn ggx(&self, n: DVec3, h: DVec3) -> f64 {
+        let a2 = self.alpha * self.alpha;
+        a2 / (PI * (n.cross(h).length_squared() + a2 * n.dot(h).powi(2)).powi(2))
+    }
+
+    fn masking_root(&self, cosine: f64) -> f64 {
+        let a2 = self.alpha * self.alpha;
+        (a2 + (1.0 - a2) * cosine * cosine).sqrt()
+    }
+
+    /// The BRDF, 1/sr, without what a smooth boundary mirrors.
+    pub fn brdf(&self, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
+        let (nv, nl) = (n.dot(v), n.dot(l));
+        if nv <= 0.0 || nl <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let h = (v + l).normalize();
+        let f = self.fresnel(v.dot(h));
+        let base = (1.0 - f) * self.diffuse / PI;
+        if self.is_smooth() {
+            return base;
+        }
+        let visibility = 0.5 / (nl * self.masking_root(nv) + nv * self.masking_root(nl));
+        base + f * self.ggx(n, h) * visibility
+    }
+
+    /// Share of the samples that go to the boundary's reflection.
+    pub fn reflection_probability(&self, nv: f64) -> f64 {
+        let reflected = self.fresnel(nv).max_element();
+        let under = self.diffuse.max_element() * (1.0 - reflected);
+        if reflected <= 0.0 {
+            0.0
+        } else if under <= 0.0 {
+            1.0
+        } else {
+            (reflected / (reflected + under)).max(0.25)
+        }
+    }
+
+    /// A reflected direction by the normals that v sees.
+    pub fn reflected_direction(&self, n: DVec3, v: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
+        let frame = basis(n);
+        let local = frame.transpose() * v;
+        let stretched = DVec3::new(self.alpha * local.x, self.alpha * local.y, local.z).normalize();
+        let (sin, cos) = (2.0 * PI * u0).sin_cos();
+        let z = (1.0 - u1) * (1.0 + stretched.z) - stretched.z;
+        let sine = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
+        let cap = DVec3::new(sine * cos, sine * sin, z) + stretched;
+        let h = (frame * DVec3::new(self.alpha * cap.x, self.alpha * cap.y, cap.z.max(1e-6))).normalize();
+        (2.0 * v.dot(h) * h - v).normalize()
+    }
+
+    /// Its density per solid angle.
+    pub fn reflected_density(&self, n: DVec3, v: DVec3, l: DVec3) -> f64 {
+        let nv = n.dot(v).max(1e-6);
+        self.ggx(n, (v + l).normalize()) * 0.5 / (nv + self.masking_root(nv))
+    }
+
+    /// BRDF · cos / density of a direction from [`Self::reflected_direction`], or of a mirror's.
+    pub fn reflected_weight(&self, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
+        let (nv, nl) = (n.dot(v), n.dot(l));
+        if self.is_smooth() {
+            return self.fresnel(nv);
+        }
+        if nl <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let (root_v, root_l) = (self.masking_root(nv), self.masking_root(nl));
+        let masking = nl * (nv + root_v) / (nl * root_v + nv * root_l);
+        self.fresnel(v.dot((v + l).normalize())) * masking
+    }
+}
