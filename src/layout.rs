@@ -134,7 +134,7 @@ device_structs! {
     }
 
     /// A material.
-    pub struct Material: 64 {
+    pub struct Material: 80 {
         /// Linear RGB albedo, reflectance or tint.
         pub base_color: [f32; 3],
         /// 0 matte, 1 mirror, 2 dielectric, 3 glossy.
@@ -149,12 +149,16 @@ device_structs! {
         pub metallic: f32,
         /// Of a glossy surface; its square is GGX's α.
         pub roughness: f32,
-        /// Zero.
-        pub padding: u32,
+        /// Share of a dielectric that passes light; the rest is glossy.
+        pub transmission: f32,
         /// Reflectance at normal incidence of the glossy surface's dielectric part, linear RGB.
         pub specular_f0: [f32; 3],
         /// Its reflectance at grazing incidence.
         pub specular_f90: f32,
+        /// Absorption coefficient inside of a dielectric, linear RGB, 1/length.
+        pub absorption: [f32; 3],
+        /// 1 for a dielectric that is a thin wall, without an inside.
+        pub thin: u32,
     }
 
     /// An emissive triangle.

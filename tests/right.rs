@@ -30,3 +30,5 @@ mod picture;
 mod references;
 #[path = "right/stage.rs"]
 mod stage;
+#[path = "right/transmission.rs"]
+mod transmission;

@@ -77,18 +77,42 @@ struct Boundary {
     float eta;       // index of the incident side over that of the other side
     vec3 reflected;  // directions
     vec3 refracted;
+    float reflected_weight; // what microfacets let through
+    float refracted_weight;
 };
 
-// ior: index of the inside over that of the outside.
-Boundary meet_boundary(Facing facing, vec3 incoming, float ior) {
-    Boundary boundary;
-    boundary.eta = facing.front ? 1.0 / ior : ior;
+// outside: index of refraction. u chooses the microfacet of a rough boundary. A thin wall is crossed without bending.
+Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float outside, vec2 u) {
     vec3 n = facing.shading_normal;
-    float cos_i = -dot(incoming, n);
+    float alpha = material.roughness * material.roughness;
+    bool rough = ROUGH_GLASS && alpha >= SMOOTH_ALPHA;
+    if (rough) {
+        facing.shading_normal = visible_normal(alpha, n, -incoming, u);
+    }
+    vec3 m = facing.shading_normal;
+    float ior = material.ior / outside;
+    Boundary boundary;
+    boundary.eta = facing.front || is_thin(material) ? 1.0 / ior : ior;
+    float cos_i = -dot(incoming, m);
     float cos_t;
     boundary.reflectance = fresnel_dielectric(cos_i, boundary.eta, cos_t);
     boundary.reflected = mirror_direction(facing, incoming);
-    boundary.refracted = normalize(boundary.eta * incoming + (boundary.eta * cos_i - cos_t) * n);
+    boundary.refracted = normalize(boundary.eta * incoming + (boundary.eta * cos_i - cos_t) * m);
+    boundary.reflected_weight = 1.0;
+    boundary.refracted_weight = 1.0;
+    if (is_thin(material)) {
+        // Microfacets on both sides: what is reflected, turned to the other side.
+        vec3 mirrored = incoming + 2.0 * cos_i * m;
+        boundary.refracted = rough ? mirrored - 2.0 * dot(mirrored, n) * n : incoming;
+        boundary.eta = 1.0;
+    }
+    if (rough) {
+        float nv = -dot(incoming, n);
+        float up = dot(incoming + 2.0 * cos_i * m, n);
+        float down = -dot(boundary.refracted, n);
+        boundary.reflected_weight = up > 0.0 ? joint_masking(alpha, nv, up) : 0.0;
+        boundary.refracted_weight = down > 0.0 ? 2.0 * down / (down + masking_root(alpha, down)) : 0.0;
+    }
     return boundary;
 }
 

@@ -6,19 +6,30 @@ struct Encounter {
     Material material;
     Facing facing;
     float outside;
-    vec3 tint; // of both sides of a dielectric boundary
+    vec3 tint;     // of both sides of a dielectric boundary
+    uint through;  // material that the ray came through, or VACUUM
+    uint beyond;   // and what lies behind a dielectric boundary
 };
+
+const uint VACUUM = 0xffffffffu;
 
 // Rounding decides which of two faces in one place a ray meets first, and the step off the one takes it past the other: where
 // they are no further apart, both are crossed at once. Glass on glass is one boundary between the two; where glass lies on
 // something opaque, that is what the ray meets.
-Encounter encounter(Hit hit, vec3 incoming) {
+// medium: the material that the ray is in, as far as its path knows.
+Encounter encounter(Hit hit, vec3 incoming, uint medium) {
     Encounter met;
     met.surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
     met.material = material_at(met.surface.material);
     met.facing = face(met.surface, incoming);
     met.outside = 1.0;
     met.tint = met.material.base_color;
+    met.through = medium;
+    met.beyond = medium;
+    if (is_dielectric(met.material) && !is_thin(met.material)) {
+        met.through = met.facing.front ? medium : met.surface.material;
+        met.beyond = met.facing.front ? met.surface.material : VACUUM;
+    }
     bool touched = CONTACT && (met.surface.flags & TOUCHED) != 0u;
     if (!touched) {
         return met;
@@ -43,6 +54,21 @@ Encounter encounter(Hit hit, vec3 incoming) {
     } else if (dot(other.geometric_normal, n) < 0.0) {
         met.outside = other_material.ior;
         met.tint *= other_material.base_color;
+        if (met.facing.front) {
+            met.through = other.material;
+        } else {
+            met.beyond = other.material;
+        }
     }
     return met;
+}
+
+// What a medium leaves of light over a distance.
+vec3 transmittance(uint medium, float distance) {
+    bool absorbs = ABSORPTION && medium != VACUUM;
+    vec3 absorption = vec3(0.0);
+    if (absorbs) {
+        absorption = TEXEL(Materials, 5u * medium + 4u).rgb;
+    }
+    return exp(-absorption * distance);
 }

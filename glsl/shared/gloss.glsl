@@ -56,6 +56,12 @@ float masking_root(float alpha, float cosine) {
     return sqrt(a2 + (1.0 - a2) * cosine * cosine);
 }
 
+// G2 / G1(v): the share of the light that v's visible normals reflect that isn't held back on its way out.
+float joint_masking(float alpha, float nv, float nl) {
+    float root_v = masking_root(alpha, nv);
+    return nl * (nv + root_v) / (nl * root_v + nv * masking_root(alpha, nl));
+}
+
 // The BRDF, 1/sr, without what a smooth boundary mirrors.
 vec3 brdf(Reflector reflector, vec3 n, vec3 v, vec3 l) {
     float nv = dot(n, v);
@@ -76,9 +82,9 @@ float reflection_probability(Reflector reflector, float nv) {
     return reflected <= 0.0 ? 0.0 : (under <= 0.0 ? 1.0 : max(reflected / (reflected + under), 0.25));
 }
 
-// A reflected direction by the normals that v sees: Dupuy and Benyoub, «Sampling Visible GGX Normals with Spherical Caps»,
-// Computer Graphics Forum 42(8), 2023.
-vec3 reflected_direction(float alpha, vec3 n, vec3 v, vec2 u) {
+// A microfacet's normal that v sees: Dupuy and Benyoub, «Sampling Visible GGX Normals with Spherical Caps», Computer
+// Graphics Forum 42(8), 2023.
+vec3 visible_normal(float alpha, vec3 n, vec3 v, vec2 u) {
     mat3 frame = basis(n);
     vec3 local = v * frame;
     vec3 stretched = normalize(vec3(alpha * local.xy, local.z));
@@ -86,7 +92,11 @@ vec3 reflected_direction(float alpha, vec3 n, vec3 v, vec2 u) {
     float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
     float sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
     vec3 cap = vec3(sine * cos(phi), sine * sin(phi), z) + stretched;
-    vec3 h = normalize(frame * normalize(vec3(alpha * cap.xy, max(cap.z, 1e-6))));
+    return normalize(frame * normalize(vec3(alpha * cap.xy, max(cap.z, 1e-6))));
+}
+
+vec3 reflected_direction(float alpha, vec3 n, vec3 v, vec2 u) {
+    vec3 h = visible_normal(alpha, n, v, u);
     return normalize(2.0 * dot(v, h) * h - v);
 }
 
@@ -103,9 +113,5 @@ vec3 reflected_weight(Reflector reflector, vec3 n, vec3 v, vec3 l) {
     if (reflector.alpha < SMOOTH_ALPHA) {
         return fresnel(reflector, nv);
     }
-    float root_v = masking_root(reflector.alpha, nv);
-    float root_l = masking_root(reflector.alpha, nl);
-    // G2 / G1(v)
-    float masking = nl * (nv + root_v) / (nl * root_v + nv * root_l);
-    return nl > 0.0 ? fresnel(reflector, dot(v, normalize(v + l))) * masking : vec3(0.0);
+    return nl > 0.0 ? fresnel(reflector, dot(v, normalize(v + l))) * joint_masking(reflector.alpha, nv, nl) : vec3(0.0);
 }

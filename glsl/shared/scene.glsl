@@ -4,6 +4,10 @@
 layout(constant_id = 6) const bool MIRRORS = true;
 layout(constant_id = 7) const bool DIELECTRICS = true;
 layout(constant_id = 8) const bool CONTACT = true;
+layout(constant_id = 10) const bool ROUGH_GLASS = false;
+layout(constant_id = 11) const bool THIN_WALLS = false;
+layout(constant_id = 12) const bool PARTLY_CLEAR = false;
+layout(constant_id = 13) const bool ABSORPTION = false;
 
 const uint MISS = 0xffffffffu;
 
@@ -43,9 +47,11 @@ struct Material {
     uint double_sided; // emits on both sides
     float metallic;    // of a glossy surface
     float roughness;
-    uint padding;
-    vec3 specular_f0;  // of its dielectric part
+    float transmission; // share of a dielectric that passes light; the rest is glossy
+    vec3 specular_f0;   // of a glossy surface's dielectric part
     float specular_f90;
+    vec3 absorption;    // inside of a dielectric, 1/length
+    uint thin;          // a dielectric without an inside
 };
 
 uniform usamplerBuffer Bvh;
@@ -65,15 +71,20 @@ ShadingTriangle shading_triangle(uint i) {
 }
 
 Material material_at(uint i) {
-    vec4 color = TEXEL(Materials, 4u * i);
-    vec4 emission = TEXEL(Materials, 4u * i + 1u);
-    uvec4 rest = TEXEL_BITS(Materials, 4u * i + 2u);
+    vec4 color = TEXEL(Materials, 5u * i);
+    vec4 emission = TEXEL(Materials, 5u * i + 1u);
+    uvec4 rest = TEXEL_BITS(Materials, 5u * i + 2u);
     vec4 specular = vec4(0.0);
+    uvec4 inside = uvec4(0u);
     if (GLOSSY) {
-        specular = TEXEL(Materials, 4u * i + 3u);
+        specular = TEXEL(Materials, 5u * i + 3u);
+    }
+    if (DIELECTRICS) {
+        inside = TEXEL_BITS(Materials, 5u * i + 4u);
     }
     return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, uintBitsToFloat(rest.y),
-                    uintBitsToFloat(rest.z), rest.w, specular.rgb, specular.w);
+                    uintBitsToFloat(rest.z), uintBitsToFloat(rest.w), specular.rgb, specular.w,
+                    uintBitsToFloat(inside.xyz), inside.w);
 }
 
 bool is_mirror(Material material) {
@@ -82,6 +93,23 @@ bool is_mirror(Material material) {
 
 bool is_dielectric(Material material) {
     return DIELECTRICS && material.surface == DIELECTRIC;
+}
+
+bool is_thin(Material material) {
+    return THIN_WALLS && material.thin != 0u;
+}
+
+// A surface that passes a part of the light only is by chance all clear or all glossy; u is a uniform number again after
+// that. Returns whether it has a glossy part.
+bool choose_part(inout Material material, inout float u) {
+    bool mixed = PARTLY_CLEAR && is_dielectric(material) && material.transmission < 1.0;
+    if (mixed) {
+        float t = material.transmission;
+        bool clear = u < t;
+        u = clear ? u / t : (u - t) / (1.0 - t);
+        material.surface = clear ? DIELECTRIC : GLOSSY_SURFACE;
+    }
+    return mixed;
 }
 
 bool is_glossy(Material material) {

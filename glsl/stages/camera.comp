@@ -38,6 +38,7 @@ struct Branch {
     vec3 emitted;
     uint depth;
     uint ignored;
+    uint medium;          // material that it is in, or VACUUM
     bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
     bool emission_seen;   // what the next surface emits
 };
@@ -94,6 +95,7 @@ void main() {
     branch.emitted = vec3(0.0);
     branch.depth = 0u;
     branch.ignored = MISS;
+    branch.medium = VACUUM;
     branch.reflection_seen = false;
     branch.emission_seen = false;
 
@@ -109,16 +111,23 @@ void main() {
         if (loops_cut) {
             cut = true;
         } else if (hit.triangle != MISS) {
-            Encounter met = encounter(hit, branch.direction);
+            Encounter met = encounter(hit, branch.direction, branch.medium);
             Surface surface = met.surface;
             Material material = met.material;
             Facing facing = met.facing;
+            if (ABSORPTION) {
+                branch.throughput *= transmittance(met.through, hit.t);
+            }
             if (emits(material, facing.front)) {
                 branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * material.emission;
             }
             branch.emission_seen = false;
             // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
             Reflector reflector = Reflector(material.base_color, vec3(0.0), 0.0, 0.0);
+            if (PARTLY_CLEAR) {
+                u = next4(random);
+                choose_part(material, u.x);
+            }
             if (is_glossy(material)) {
                 reflector = reflector_of(material);
             }
@@ -154,15 +163,16 @@ void main() {
                     reflector.alpha = 0.0;
                     ended = stops || largest(branch.throughput) <= 0.0;
                 } else if (DIELECTRICS) {
-                    Boundary boundary = meet_boundary(facing, branch.direction, material.ior / met.outside);
+                    Boundary boundary = meet_boundary(facing, branch.direction, material, met.outside, u.yz);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
-                    vec3 transmission = met.tint * (boundary.eta * boundary.eta);
+                    vec3 transmission = met.tint * (boundary.eta * boundary.eta * boundary.refracted_weight);
                     bool split = used + pending_count + 1u < SLOTS && boundary.reflectance < 1.0;
                     bool reflect_now = u.x < boundary.reflectance;
                     if (split) {
                         Branch other = branch;
                         other.direction = boundary.reflected;
-                        other.throughput *= boundary.reflectance;
+                        other.throughput *= boundary.reflectance * boundary.reflected_weight;
+                        other.medium = met.through;
                         other.emitted = vec3(0.0);
                         other.origin = origin_towards(surface, other.direction);
                         pending[pending_count] = other;
@@ -174,7 +184,8 @@ void main() {
                         branch.reflection_seen = true;
                         vec3 from = origin_towards(surface, boundary.reflected);
                         Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle);
-                        branch.emitted += branch.throughput * boundary.reflectance * reflection.emission;
+                        branch.emitted += branch.throughput * boundary.reflectance * boundary.reflected_weight *
+                                          reflection.emission;
                         if (reflection.dark) {
                             // That was all there is to the reflection.
                             branch.throughput *= 1.0 - boundary.reflectance;
@@ -183,7 +194,9 @@ void main() {
                         branch.emission_seen = reflect_now;
                     }
                     branch.direction = reflect_now ? boundary.reflected : boundary.refracted;
-                    branch.throughput *= reflect_now ? vec3(1.0) : transmission;
+                    branch.throughput *= reflect_now ? vec3(boundary.reflected_weight) : transmission;
+                    branch.medium = reflect_now ? met.through : met.beyond;
+                    ended = largest(branch.throughput) <= 0.0;
                 }
                 branch.origin = origin_towards(surface, branch.direction);
             }

@@ -64,8 +64,11 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     }
     // Then down: it may bend, but it must be there, under glass that lies on it too.
     Hit below = trace(origin + along, -radius * n, 1.0, MISS, false);
-    if (CONTACT && below.triangle != MISS && is_dielectric(material_at(shading_triangle(below.triangle).material))) {
-        below = trace(origin + along, -radius * n, 1.0, below.triangle, false);
+    if (CONTACT && below.triangle != MISS) {
+        ShadingTriangle met = shading_triangle(below.triangle);
+        if (met.object != object && is_dielectric(material_at(met.material))) {
+            below = trace(origin + along, -radius * n, 1.0, below.triangle, false);
+        }
     }
     return below.triangle != MISS && shading_triangle(below.triangle).object == object;
 }

@@ -40,6 +40,7 @@ struct Path {
     vec3 flux;
     uint depth;
     uint ignored;
+    uint medium; // material that it is in, or VACUUM
     bool seen_directly; // no specular bounce since the light: direct light, which `direct` samples
 };
 
@@ -64,6 +65,7 @@ Path emit(inout Random random) {
     path.flux = material.emission * (PI * sides * light.area / choice.width);
     path.depth = 0u;
     path.ignored = light.triangle;
+    path.medium = VACUUM;
     path.seen_directly = true;
     return path;
 }
@@ -113,33 +115,44 @@ void main() {
             continue;
         }
         vec3 incoming = path.direction;
-        Encounter met = encounter(hit, incoming);
+        Encounter met = encounter(hit, incoming, path.medium);
         Surface surface = met.surface;
         Material material = met.material;
         Facing facing = met.facing;
+        if (ABSORPTION) {
+            path.flux *= transmittance(met.through, hit.t);
+            if (largest(path.flux) <= 0.0) {
+                alive = false;
+                continue;
+            }
+        }
         vec4 u = next4(random);
-        if (is_matte(material) || is_glossy(material)) {
+        bool stores = choose_part(material, u.w) || is_matte(material) || is_glossy(material);
+        vec3 landing = path.flux;
+        if (stores) {
             // A photon's flux is per area of the surface; the shading normal's cosine replaces the geometric one's:
             // Veach, «Robust Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
             float correction = dot(incoming, facing.shading_normal) / dot(incoming, facing.geometric_normal);
-            vec3 flux = path.flux * correction;
-            if (!finite(flux)) {
+            landing *= correction;
+            if (!finite(landing)) {
                 non_finite += 1u;
             } else if (!(SAMPLE_LIGHTS && path.seen_directly)) {
                 if (stored < settings.lane_capacity) {
                     Photon photon;
                     photon.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
-                    photon.flux_direction = vec4(flux, uintBitsToFloat(encode_direction(incoming)));
+                    photon.flux_direction = vec4(landing, uintBitsToFloat(encode_direction(incoming)));
                     lane_photons[stored * settings.photon_lanes + lane] = photon;
                 }
                 stored += 1u;
             }
-            path.seen_directly = false;
+        }
+        path.seen_directly = false;
+        if (is_matte(material) || is_glossy(material)) {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             vec3 outgoing = cosine_direction(facing.geometric_normal, u.xy);
-            vec3 scattered = flux * material.base_color;
+            vec3 scattered = landing * material.base_color;
             if (is_glossy(material)) {
-                scattered = flux * scatter(reflector_of(material), facing, -incoming, u, outgoing);
+                scattered = landing * scatter(reflector_of(material), facing, -incoming, u, outgoing);
             }
             alive = dot(outgoing, facing.shading_normal) > 0.0 && finite(scattered) &&
                     survives(path.flux, scattered, u.z);
@@ -148,13 +161,13 @@ void main() {
             float cos_i = -dot(incoming, facing.shading_normal);
             alive = survives(path.flux, path.flux * fresnel_schlick(material.base_color, cos_i), u.z);
             path.direction = mirror_direction(facing, incoming);
-            path.seen_directly = false;
         } else if (DIELECTRICS) {
-            Boundary boundary = meet_boundary(facing, incoming, material.ior / met.outside);
+            Boundary boundary = meet_boundary(facing, incoming, material, met.outside, u.yw);
             bool reflected = u.x < boundary.reflectance;
-            alive = reflected || survives(path.flux, path.flux * met.tint, u.z);
+            vec3 weight = reflected ? vec3(boundary.reflected_weight) : met.tint * boundary.refracted_weight;
+            alive = survives(path.flux, path.flux * weight, u.z);
             path.direction = reflected ? boundary.reflected : boundary.refracted;
-            path.seen_directly = false;
+            path.medium = reflected ? met.through : met.beyond;
         }
         path.origin = origin_towards(surface, path.direction);
         path.ignored = surface.triangle;

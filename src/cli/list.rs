@@ -72,7 +72,8 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
             "materials": {
                 "matte": count(|s| matches!(s, Surface::Matte)),
                 "mirror": count(|s| matches!(s, Surface::Mirror)),
-                "dielectric": count(|s| matches!(s, Surface::Dielectric { .. })),
+                "dielectric": count(|s| matches!(s, Surface::Dielectric(_))),
+                "glossy": count(|s| matches!(s, Surface::Glossy(_))),
             },
             "emissive_triangles": packed.lights.len(),
             "cameras": scene.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
@@ -92,10 +93,11 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
     writeln!(text, "objects      {}", scene.objects.len())?;
     writeln!(
         text,
-        "materials    {} matte, {} mirror, {} dielectric",
+        "materials    {} matte, {} mirror, {} dielectric, {} glossy",
         count(|s| matches!(s, Surface::Matte)),
         count(|s| matches!(s, Surface::Mirror)),
-        count(|s| matches!(s, Surface::Dielectric { .. }))
+        count(|s| matches!(s, Surface::Dielectric(_))),
+        count(|s| matches!(s, Surface::Glossy(_)))
     )?;
     writeln!(text, "lights       {} emissive triangles", packed.lights.len())?;
     for (index, camera) in scene.cameras.iter().enumerate() {

@@ -6,7 +6,7 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::contact::Encounter;
+use super::contact::{Encounter, choose_part, transmittance};
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
 use super::intersect::{Ray, nearest_hit};
 use super::light::emits;
@@ -27,6 +27,8 @@ struct Branch {
     emitted: DVec3,
     depth: u32,
     ignored: Option<u32>,
+    /// Material that it is in.
+    medium: Option<u32>,
     /// What a boundary that didn't split the path reflects of the lights' own radiance has been seen.
     reflection_seen: bool,
     /// What the next surface emits has been seen.
@@ -164,6 +166,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
         emitted: DVec3::ZERO,
         depth: 0,
         ignored: None,
+        medium: None,
         reflection_seen: false,
         emission_seen: false,
     }];
@@ -174,12 +177,9 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 break nothing_seen(branch.emitted);
             };
             let incoming = branch.ray.direction;
-            let Encounter {
-                surface,
-                facing,
-                ior,
-                tint,
-            } = Encounter::new(inputs, hit, incoming);
+            let met = Encounter::new(inputs, hit, incoming, branch.medium);
+            let (surface, facing) = (met.surface, met.facing);
+            branch.throughput *= transmittance(inputs, met.through, hit.t);
             let base_color = rgb(surface.material.base_color);
             if emits(surface.material, facing.front) {
                 let emission = rgb(surface.material.emission);
@@ -190,7 +190,11 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 };
             }
             branch.emission_seen = false;
-            let (is_matte, is_glossy) = (surface.material.surface == MATTE, surface.material.surface == GLOSSY);
+            let mut kind = surface.material.surface;
+            if inputs.scene.features.partly_clear {
+                (kind, ..) = choose_part(surface.material, random.next4()[0]);
+            }
+            let (is_matte, is_glossy) = (kind == MATTE, kind == GLOSSY);
             // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
             let reflector = if is_glossy {
                 Reflector::of_material(surface.material)
@@ -239,13 +243,13 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 }
                 break seen(inputs, &branch, &surface, &facing, stopping);
             }
-            branch.ray.direction = if surface.material.surface == MIRROR {
+            branch.ray.direction = if kind == MIRROR {
                 branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
                 facing.reflect(incoming)
             } else {
-                let boundary = Boundary::new(&facing, incoming, ior);
+                let boundary = Boundary::new(&facing, incoming, surface.material, met.outside, [second, third]);
                 // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
-                let transmission = tint * boundary.eta.powi(2);
+                let transmission = met.tint * boundary.eta.powi(2) * boundary.refracted_weight;
                 match boundary.refracted {
                     // While a slot is free, both branches are followed, each weighed with its share.
                     Some(refracted) if used + pending.len() + 1 < slots.len() => {
@@ -254,11 +258,13 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                                 origin: surface.origin_towards(boundary.reflected),
                                 direction: boundary.reflected,
                             },
-                            throughput: branch.throughput * boundary.reflectance,
+                            throughput: branch.throughput * boundary.reflectance * boundary.reflected_weight,
+                            medium: met.through,
                             emitted: DVec3::ZERO,
                             ..branch
                         });
                         branch.throughput *= (1.0 - boundary.reflectance) * transmission;
+                        branch.medium = met.beyond;
                         refracted
                     }
                     Some(refracted) => {
@@ -270,7 +276,8 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                                 direction: boundary.reflected,
                             };
                             let (emission, dark) = glimpse(inputs, ray, Some(surface.triangle));
-                            branch.emitted += branch.throughput * boundary.reflectance * emission;
+                            branch.emitted +=
+                                branch.throughput * boundary.reflectance * boundary.reflected_weight * emission;
                             if dark {
                                 branch.throughput *= 1.0 - boundary.reflectance;
                                 refracts = true;
@@ -279,14 +286,24 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                         }
                         if refracts {
                             branch.throughput *= transmission;
+                            branch.medium = met.beyond;
                             refracted
                         } else {
+                            branch.throughput *= boundary.reflected_weight;
+                            branch.medium = met.through;
                             boundary.reflected
                         }
                     }
-                    None => boundary.reflected,
+                    None => {
+                        branch.throughput *= boundary.reflected_weight;
+                        branch.medium = met.through;
+                        boundary.reflected
+                    }
                 }
             };
+            if branch.throughput.max_element() <= 0.0 {
+                break nothing_seen(branch.emitted);
+            }
             branch.ray.origin = surface.origin_towards(branch.ray.direction);
         };
         used += 1;

@@ -4,30 +4,44 @@ use glam::DVec3;
 
 use super::Inputs;
 use super::intersect::{Hit, Ray, nearest_hit};
-use super::surface::{DIELECTRIC, Facing, ROUNDINGS, Surface, surface_at};
+use super::surface::{DIELECTRIC, Facing, GLOSSY, ROUNDINGS, Surface, surface_at};
 use super::vector::rgb;
-use crate::layout::TOUCHED;
+use crate::layout::{Material, TOUCHED};
 
 /// Where a ray meets matter.
 pub(super) struct Encounter<'a> {
     pub surface: Surface<'a>,
     pub facing: Facing,
-    /// Index of a dielectric's inside over that of its outside.
-    pub ior: f64,
+    /// Index of refraction outside of a dielectric.
+    pub outside: f64,
     /// What light keeps that passes a dielectric boundary, of both sides.
     pub tint: DVec3,
+    /// Material that the ray came through.
+    pub through: Option<u32>,
+    /// And what lies behind a dielectric boundary.
+    pub beyond: Option<u32>,
 }
 
 impl<'a> Encounter<'a> {
     /// Which of two faces in one place comes first is chance: both are crossed at once. Glass on glass is one boundary between
-    /// the two; on something opaque that is what the ray meets.
-    pub fn new(inputs: &Inputs<'a>, hit: Hit, incoming: DVec3) -> Self {
+    /// the two; on something opaque that is what the ray meets. `medium`: the material that the ray is in, as far as its
+    /// path knows.
+    pub fn new(inputs: &Inputs<'a>, hit: Hit, incoming: DVec3, medium: Option<u32>) -> Self {
         let at = |hit: Hit| surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
         let surface = at(hit);
+        let own = Some(surface.material_index);
+        let solid = surface.material.surface == DIELECTRIC && surface.material.thin == 0;
+        let (through, beyond) = match (solid, Facing::new(&surface, incoming).front) {
+            (false, _) => (medium, medium),
+            (true, true) => (medium, own),
+            (true, false) => (own, None),
+        };
         let alone = |surface: Surface<'a>| Self {
             facing: Facing::new(&surface, incoming),
-            ior: f64::from(surface.material.ior),
+            outside: 1.0,
             tint: rgb(surface.material.base_color),
+            through,
+            beyond,
             surface,
         };
         if surface.flags & TOUCHED == 0 {
@@ -46,12 +60,38 @@ impl<'a> Encounter<'a> {
         let other = nearest_hit(inputs, through, 1.0, Some(hit.triangle)).map(at);
         match other.filter(touches) {
             Some(other) if other.material.surface != DIELECTRIC => alone(other),
-            Some(other) if other.geometric_normal.dot(n) < 0.0 => Self {
-                ior: f64::from(surface.material.ior) / f64::from(other.material.ior),
-                tint: rgb(surface.material.base_color) * rgb(other.material.base_color),
-                ..alone(surface)
-            },
+            Some(other) if other.geometric_normal.dot(n) < 0.0 => {
+                let met = alone(surface);
+                let other_side = Some(other.material_index);
+                Self {
+                    outside: f64::from(other.material.ior),
+                    tint: met.tint * rgb(other.material.base_color),
+                    through: if met.facing.front { other_side } else { met.through },
+                    beyond: if met.facing.front { met.beyond } else { other_side },
+                    ..met
+                }
+            }
             _ => alone(surface),
         }
+    }
+}
+
+/// What a medium leaves of light over a distance.
+pub(super) fn transmittance(inputs: &Inputs<'_>, medium: Option<u32>, distance: f64) -> DVec3 {
+    medium.map_or(DVec3::ONE, |material| {
+        (-rgb(inputs.scene.materials[material as usize].absorption) * distance).exp()
+    })
+}
+
+/// A surface that passes a part of the light only is by chance all clear or all glossy: returns what it is, whether it has a
+/// glossy part, and a uniform number.
+pub(super) fn choose_part(material: &Material, u: f64) -> (u32, bool, f64) {
+    let t = f64::from(material.transmission);
+    if material.surface != DIELECTRIC || t >= 1.0 {
+        (material.surface, false, u)
+    } else if u < t {
+        (DIELECTRIC, true, u / t)
+    } else {
+        (GLOSSY, true, (u - t) / (1.0 - t))
     }
 }

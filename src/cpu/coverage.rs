@@ -81,6 +81,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
     };
     let mut below = nearest_hit(inputs, down, 1.0, None);
     if let Some(hit) = below
+        && object_of(hit.triangle) != object
         && surface_of(hit.triangle) == DIELECTRIC
     {
         below = nearest_hit(inputs, down, 1.0, Some(hit.triangle));

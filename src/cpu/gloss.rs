@@ -49,6 +49,11 @@ impl Reflector {
         }
     }
 
+    /// The same with microfacets.
+    pub(super) fn with_alpha(self, alpha: f64) -> Self {
+        Self { alpha, ..self }
+    }
+
     /// What a visible point keeps, and the direction to the viewer.
     pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
@@ -119,8 +124,8 @@ impl Reflector {
         }
     }
 
-    /// A reflected direction by the normals that v sees.
-    pub fn reflected_direction(&self, n: DVec3, v: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
+    /// A microfacet's normal that v sees.
+    pub(super) fn visible_normal(&self, n: DVec3, v: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
         let frame = basis(n);
         let local = frame.transpose() * v;
         let stretched = DVec3::new(self.alpha * local.x, self.alpha * local.y, local.z).normalize();
@@ -128,8 +133,24 @@ impl Reflector {
         let z = (1.0 - u1) * (1.0 + stretched.z) - stretched.z;
         let sine = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
         let cap = DVec3::new(sine * cos, sine * sin, z) + stretched;
-        let h = (frame * DVec3::new(self.alpha * cap.x, self.alpha * cap.y, cap.z.max(1e-6))).normalize();
+        (frame * DVec3::new(self.alpha * cap.x, self.alpha * cap.y, cap.z.max(1e-6))).normalize()
+    }
+
+    /// A reflected direction by the normals that v sees.
+    pub fn reflected_direction(&self, n: DVec3, v: DVec3, u: [f64; 2]) -> DVec3 {
+        let h = self.visible_normal(n, v, u);
         (2.0 * v.dot(h) * h - v).normalize()
+    }
+
+    /// The share of the light that v's visible normals reflect that isn't held back on its way out.
+    pub(super) fn joint_masking(&self, nv: f64, nl: f64) -> f64 {
+        let root_v = self.masking_root(nv);
+        nl * (nv + root_v) / (nl * root_v + nv * self.masking_root(nl))
+    }
+
+    /// The same of the light that they pass.
+    pub(super) fn masking(&self, cosine: f64) -> f64 {
+        2.0 * cosine / (cosine + self.masking_root(cosine))
     }
 
     /// Its density per solid angle.
@@ -147,8 +168,6 @@ impl Reflector {
         if nl <= 0.0 {
             return DVec3::ZERO;
         }
-        let (root_v, root_l) = (self.masking_root(nv), self.masking_root(nl));
-        let masking = nl * (nv + root_v) / (nl * root_v + nv * root_l);
-        self.fresnel(v.dot((v + l).normalize())) * masking
+        self.fresnel(v.dot((v + l).normalize())) * self.joint_masking(nv, nl)
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::contact::Encounter;
+use super::contact::{Encounter, choose_part, transmittance};
 use super::gloss::Reflector;
 use super::intersect::{Ray, nearest_hit};
 use super::light::{Choice, choose_light};
@@ -51,6 +51,8 @@ struct Path {
     ray: Ray,
     flux: DVec3,
     ignored: Option<u32>,
+    /// Material that it is in.
+    medium: Option<u32>,
     /// No specular bounce since the light: direct light, which the stage `direct` samples.
     seen_directly: bool,
 }
@@ -79,6 +81,7 @@ fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Path {
         },
         flux,
         ignored: Some(light.triangle),
+        medium: None,
         seen_directly: true,
     }
 }
@@ -100,51 +103,61 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             return;
         };
         let incoming = path.ray.direction;
-        let Encounter {
-            surface,
-            facing,
-            ior,
-            tint,
-        } = Encounter::new(inputs, hit, incoming);
+        let met = Encounter::new(inputs, hit, incoming, path.medium);
+        let (surface, facing) = (met.surface, met.facing);
         let material = surface.material;
-        let u @ [choice, second, survival, _] = random.next4();
-        let (direction, flux) = if [MATTE, GLOSSY].contains(&material.surface) {
+        path.flux *= transmittance(inputs, met.through, hit.t);
+        if path.flux.max_element() <= 0.0 {
+            return;
+        }
+        let mut u = random.next4();
+        let (kind, mixed, rest) = choose_part(material, u[3]);
+        u[3] = rest;
+        let [choice, second, survival, _] = u;
+        let scatters = [MATTE, GLOSSY].contains(&kind);
+        let mut landing = path.flux;
+        if mixed || scatters {
             // Flux is per area of the geometric surface, scattering per cosine to the shading normal: Veach, «Robust
             // Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
-            let flux = path.flux * incoming.dot(facing.shading_normal) / incoming.dot(facing.geometric_normal);
-            if !flux.is_finite() {
+            landing *= incoming.dot(facing.shading_normal) / incoming.dot(facing.geometric_normal);
+            if !landing.is_finite() {
                 counts.add_non_finite(1);
                 return;
             }
             if !(samples_lights && path.seen_directly) {
                 photons.push(Photon {
                     position_object: with_word(surface.position, surface.object),
-                    flux_direction: with_word(flux, encode_direction(incoming)),
+                    flux_direction: with_word(landing, encode_direction(incoming)),
                 });
             }
+        }
+        let mut medium = path.medium;
+        let (direction, flux) = if scatters {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             let outgoing = cosine_direction(facing.geometric_normal, choice, second);
-            let (outgoing, weight) = if material.surface == GLOSSY {
+            let (outgoing, weight) = if kind == GLOSSY {
                 facing.scatter(&Reflector::of_material(material), incoming, u, outgoing)
             } else {
                 (outgoing, rgb(material.base_color))
             };
-            let scattered = roulette(path.flux, flux * weight, survival);
+            let scattered = roulette(path.flux, landing * weight, survival);
             (
                 outgoing,
                 scattered.filter(|_| outgoing.dot(facing.shading_normal) > 0.0),
             )
-        } else if material.surface == MIRROR {
+        } else if kind == MIRROR {
             let reflected = path.flux * facing.mirror_reflectance(material.base_color, incoming);
             (facing.reflect(incoming), roulette(path.flux, reflected, survival))
         } else {
-            let boundary = Boundary::new(&facing, incoming, ior);
-            match boundary.refracted {
+            let boundary = Boundary::new(&facing, incoming, material, met.outside, [u[1], u[3]]);
+            let (direction, weight, side) = match boundary.refracted {
                 Some(refracted) if choice >= boundary.reflectance => {
-                    (refracted, roulette(path.flux, path.flux * tint, survival))
+                    (refracted, met.tint * boundary.refracted_weight, met.beyond)
                 }
-                _ => (boundary.reflected, Some(path.flux)),
-            }
+                _ => (boundary.reflected, DVec3::splat(boundary.reflected_weight), met.through),
+            };
+            medium = side;
+            (direction, roulette(path.flux, path.flux * weight, survival))
         };
         let Some(flux) = flux else { return };
         path = Path {
@@ -154,6 +167,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             },
             flux,
             ignored: Some(surface.triangle),
+            medium,
             seen_directly: false,
         };
     }

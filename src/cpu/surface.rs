@@ -34,6 +34,8 @@ pub(super) struct Surface<'a> {
     pub shading_normal: DVec3,
     pub object: u32,
     pub material: &'a Material,
+    /// Its index.
+    pub material_index: u32,
     /// Index of its light, or [`crate::layout::NO_LIGHT`].
     pub light: u32,
     /// Of the triangle.
@@ -53,6 +55,7 @@ pub(super) fn surface_at(scene: &PackedScene, index: u32, u: f64, v: f64) -> Sur
         shading_normal: interpolated_normal(triangle, u, v, geometric_normal),
         object: triangle.object,
         material: &scene.materials[triangle.material as usize],
+        material_index: triangle.material,
         light: triangle.light,
         flags: triangle.flags,
     }
@@ -184,50 +187,85 @@ impl Facing {
     }
 }
 
-/// What can happen at a smooth dielectric boundary.
+/// What can happen at a dielectric boundary.
 pub(super) struct Boundary {
     /// Share of the power that is reflected.
     pub reflectance: f64,
-    /// Index of the incident side over that of the other side.
+    /// Index of the incident side over that of the other side; 1 for a thin wall.
     pub eta: f64,
     pub reflected: DVec3,
     /// `None` for total internal reflection.
     pub refracted: Option<DVec3>,
+    /// What microfacets let through of what is reflected.
+    pub reflected_weight: f64,
+    /// And of what is refracted.
+    pub refracted_weight: f64,
 }
 
 impl Boundary {
-    /// Snell's law and Fresnel's equations for unpolarised light; `ior`: index of the inside over that of the outside.
-    pub fn new(facing: &Facing, incoming: DVec3, ior: f64) -> Self {
+    /// Snell's law and Fresnel's equations for unpolarised light; `outside`: index of refraction. `u` chooses the microfacet
+    /// of a rough boundary.
+    pub fn new(facing: &Facing, incoming: DVec3, material: &Material, outside: f64, u: [f64; 2]) -> Self {
         let n = facing.shading_normal;
-        let (n_i, n_t) = if facing.front { (1.0, ior) } else { (ior, 1.0) };
+        let microfacets = Reflector::matte(DVec3::ZERO).with_alpha(f64::from(material.roughness).powi(2));
+        let rough = !microfacets.is_smooth();
+        let m = if rough {
+            microfacets.visible_normal(n, -incoming, u)
+        } else {
+            n
+        };
+        let thin = material.thin != 0;
+        let ior = f64::from(material.ior) / outside;
+        let (n_i, n_t) = if facing.front || thin { (1.0, ior) } else { (ior, 1.0) };
         let eta = n_i / n_t;
-        let cos_i = -incoming.dot(n);
+        let cos_i = -incoming.dot(m);
         let sin2_t = eta * eta * (1.0 - cos_i * cos_i).max(0.0);
-        let reflected = facing.reflect(incoming);
+        let mirrored = incoming + 2.0 * cos_i * m;
+        let nv = -incoming.dot(n);
+        let up = mirrored.dot(n);
+        let micro = Facing {
+            shading_normal: m,
+            ..*facing
+        };
+        let mut boundary = Self {
+            reflectance: 1.0,
+            eta,
+            reflected: micro.reflect(incoming),
+            refracted: None,
+            reflected_weight: match (rough, up > 0.0) {
+                (false, _) => 1.0,
+                (true, true) => microfacets.joint_masking(nv, up),
+                (true, false) => 0.0,
+            },
+            refracted_weight: 1.0,
+        };
         if sin2_t >= 1.0 {
-            return Self {
-                reflectance: 1.0,
-                eta,
-                reflected,
-                refracted: None,
-            };
+            return boundary;
         }
         let cos_t = (1.0 - sin2_t).sqrt();
         let r_parallel = (n_t * cos_i - n_i * cos_t) / (n_t * cos_i + n_i * cos_t);
         let r_perpendicular = (n_i * cos_i - n_t * cos_t) / (n_i * cos_i + n_t * cos_t);
+        boundary.reflectance = 0.5 * (r_parallel.powi(2) + r_perpendicular.powi(2));
         // The tangential part of the wave vector stays the same.
-        let tangential = eta * (incoming + cos_i * n);
-        Self {
-            reflectance: 0.5 * (r_parallel.powi(2) + r_perpendicular.powi(2)),
-            eta,
-            reflected,
-            refracted: Some((tangential - cos_t * n).normalize()),
+        let mut refracted = (eta * (incoming + cos_i * m) - cos_t * m).normalize();
+        if thin {
+            // Microfacets on both sides: what is reflected, turned to the other side.
+            refracted = if rough { mirrored - 2.0 * up * n } else { incoming };
+            boundary.eta = 1.0;
         }
+        if rough {
+            let down = -refracted.dot(n);
+            boundary.refracted_weight = if down > 0.0 { microfacets.masking(down) } else { 0.0 };
+        }
+        boundary.refracted = Some(refracted);
+        boundary
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use bytemuck::Zeroable;
+
     use super::*;
 
     fn facing(front: bool) -> Facing {
@@ -238,16 +276,27 @@ mod tests {
         }
     }
 
+    fn glass() -> Material {
+        Material {
+            ior: 1.5,
+            ..Material::zeroed()
+        }
+    }
+
+    fn meet(front: bool, incoming: DVec3) -> Boundary {
+        Boundary::new(&facing(front), incoming, &glass(), 1.0, [0.0; 2])
+    }
+
     fn incoming(angle: f64) -> DVec3 {
         DVec3::new(angle.sin(), 0.0, -angle.cos())
     }
 
     #[test]
     fn glass_reflects_four_percent_and_bends_by_snells_law() {
-        let boundary = Boundary::new(&facing(true), incoming(0.0), 1.5);
+        let boundary = meet(true, incoming(0.0));
         assert!((boundary.reflectance - 0.04).abs() < 1e-12);
         let angle: f64 = 0.7;
-        let boundary = Boundary::new(&facing(true), incoming(angle), 1.5);
+        let boundary = meet(true, incoming(angle));
         let refracted = boundary.refracted.expect("light enters the denser medium");
         assert!((refracted.x - angle.sin() / 1.5).abs() < 1e-12 && refracted.z < 0.0);
         assert!((boundary.reflected - DVec3::new(angle.sin(), 0.0, angle.cos())).length() < 1e-12);
@@ -259,14 +308,10 @@ mod tests {
         let brewster = ior.atan();
         // r∥ = 0 there, r⊥ = cos²θ_i − sin²θ_i.
         let expected = 0.5 * (brewster.cos().powi(2) - brewster.sin().powi(2)).powi(2);
-        assert!((Boundary::new(&facing(true), incoming(brewster), ior).reflectance - expected).abs() < 1e-12);
+        assert!((meet(true, incoming(brewster)).reflectance - expected).abs() < 1e-12);
         let critical = (1.0 / ior).asin();
-        assert!(
-            Boundary::new(&facing(false), incoming(critical - 1e-6), ior)
-                .refracted
-                .is_some()
-        );
-        let beyond = Boundary::new(&facing(false), incoming(critical + 1e-6), ior);
+        assert!(meet(false, incoming(critical - 1e-6)).refracted.is_some());
+        let beyond = meet(false, incoming(critical + 1e-6));
         assert!(beyond.refracted.is_none() && beyond.reflectance == 1.0);
     }
 

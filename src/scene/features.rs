@@ -16,8 +16,16 @@ pub struct SceneFeatures {
     pub mirror: bool,
     /// Boundaries of dielectrics.
     pub dielectric: bool,
-    /// Microfacets.
+    /// Microfacets over a base.
     pub glossy: bool,
+    /// Microfacets of dielectrics.
+    pub rough_glass: bool,
+    /// Dielectrics without an inside.
+    pub thin_walls: bool,
+    /// Dielectrics that pass a part of the light only.
+    pub partly_clear: bool,
+    /// Dielectrics that absorb light inside.
+    pub absorption: bool,
     /// Boundaries of dielectrics that lie on faces of other objects.
     pub contact: bool,
 }
@@ -28,6 +36,10 @@ impl SceneFeatures {
         mirror: true,
         dielectric: true,
         glossy: true,
+        rough_glass: true,
+        thin_walls: true,
+        partly_clear: true,
+        absorption: true,
         contact: true,
     };
 
@@ -35,21 +47,31 @@ impl SceneFeatures {
     pub(super) fn of(triangles: &[ShadingTriangle], materials: &[Material]) -> Self {
         let mut features = Self::default();
         for triangle in triangles {
-            let surface = materials[triangle.material as usize].surface;
-            features.mirror |= surface == MIRROR;
-            features.dielectric |= surface == DIELECTRIC;
-            features.glossy |= surface == GLOSSY;
+            let material = &materials[triangle.material as usize];
+            let glass = material.surface == DIELECTRIC;
+            let mixed = glass && material.transmission < 1.0;
+            features.mirror |= material.surface == MIRROR;
+            features.dielectric |= glass;
+            features.glossy |= material.surface == GLOSSY || mixed;
+            features.rough_glass |= glass && material.roughness > 0.0;
+            features.thin_walls |= glass && material.thin != 0;
+            features.partly_clear |= mixed;
+            features.absorption |= glass && material.absorption != [0.0; 3];
             features.contact |= triangle.flags & TOUCHED != 0;
         }
         features
     }
 
     /// Each feature's constant in the kernels, and its value.
-    pub fn constants(self) -> [(&'static str, bool); 4] {
+    pub fn constants(self) -> [(&'static str, bool); 8] {
         [
             ("MIRRORS", self.mirror),
             ("DIELECTRICS", self.dielectric),
             ("GLOSSY", self.glossy),
+            ("ROUGH_GLASS", self.rough_glass),
+            ("THIN_WALLS", self.thin_walls),
+            ("PARTLY_CLEAR", self.partly_clear),
+            ("ABSORPTION", self.absorption),
             ("CONTACT", self.contact),
         ]
     }
@@ -57,6 +79,6 @@ impl SceneFeatures {
     /// Names of those that the scene has.
     pub fn names(self) -> Vec<String> {
         let present = self.constants().into_iter().filter(|(_, present)| *present);
-        present.map(|(name, _)| name.to_lowercase()).collect()
+        present.map(|(name, _)| name.to_lowercase().replace('_', " ")).collect()
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::diagnostic::{Check, Warnings, quote};
 use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::graph::{PlacedNode, place_nodes};
-use super::{Scene, camera, geometry, material};
+use super::{Scene, Surface, camera, geometry, material};
 use crate::error::{Error, Result};
 
 /// Not supported yet, but named in a warning of its own.
@@ -42,6 +42,11 @@ fn load(path: &Path) -> Check<Scene> {
     let mut materials = material::materials(root, &used, &mut warnings)?;
     if used.last() == Some(&false) {
         materials.pop();
+    }
+    for material in &mut materials {
+        if let Surface::Dielectric(glass) = &mut material.surface {
+            glass.absorption /= geometry.normalisation.scale as f32;
+        }
     }
 
     let cameras = camera::cameras(root, &nodes, geometry.normalisation, &mut warnings)?;

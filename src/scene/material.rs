@@ -7,7 +7,7 @@ use gltf::json::material::AlphaMode;
 use gltf::json::validation::Checked;
 
 use super::diagnostic::{Check, Warnings, damaged, label, list, shorten};
-use super::{Gloss, Material, Surface};
+use super::{Dielectric, Gloss, Material, Surface};
 
 /// Index of refraction where the file gives none.
 const DEFAULT_IOR: f32 = 1.5;
@@ -81,33 +81,39 @@ impl Reader<'_> {
         let (specular, specular_color) = self.specular()?;
         self.check_volume()?;
 
-        if metallic == 1.0 {
-            if transmission > 0.0 {
-                self.warn("metallicFactor 1 leaves nothing of its transmission; set it to 0 for glass".into());
-            }
-            if roughness == 0.0 {
-                return Ok(Surface::Mirror);
-            }
-        } else if transmission > 0.0 && metallic > 0.0 {
-            self.warn(format!(
-                "metallicFactor {metallic}, between 0 and 1, with transmission isn't supported yet; it is rendered glass"
-            ));
+        if metallic == 1.0 && transmission > 0.0 {
+            self.warn("metallicFactor 1 leaves nothing of its transmission; set it to 0 for glass".into());
         }
-        if transmission == 0.0 || metallic == 1.0 {
-            if metallic == 0.0 && specular == 0.0 {
-                return Ok(Surface::Matte);
-            }
-            // KHR_materials_ior and KHR_materials_specular.
-            let of_ior = ((ior - 1.0) / (ior + 1.0)).powi(2);
-            return Ok(Surface::Glossy(Gloss {
-                metallic,
-                roughness,
-                specular_f0: (specular_color * of_ior).min(Vec3::ONE) * specular,
-                specular_f90: specular,
-            }));
+        if metallic == 1.0 && roughness == 0.0 {
+            return Ok(Surface::Mirror);
         }
-        self.warn_of_glass(transmission, roughness);
-        Ok(Surface::Dielectric { ior })
+        let clear = transmission * (1.0 - metallic);
+        if clear == 0.0 && metallic == 0.0 && specular == 0.0 {
+            return Ok(Surface::Matte);
+        }
+        // KHR_materials_ior and KHR_materials_specular.
+        let of_ior = ((ior - 1.0) / (ior + 1.0)).powi(2);
+        let gloss = Gloss {
+            // Of what isn't clear.
+            metallic: if clear < 1.0 { metallic / (1.0 - clear) } else { 0.0 },
+            roughness,
+            specular_f0: (specular_color * of_ior).min(Vec3::ONE) * specular,
+            specular_f90: specular,
+        };
+        if clear == 0.0 {
+            return Ok(Surface::Glossy(gloss));
+        }
+        self.warn_of_glass();
+        let volume = self.extension(|extensions| extensions.volume.as_ref());
+        let thin = volume.is_none_or(|volume| volume.thickness_factor.0 == 0.0);
+        Ok(Surface::Dielectric(Dielectric {
+            ior,
+            roughness,
+            transmission: clear,
+            gloss,
+            thin,
+            absorption: volume.filter(|_| !thin).map_or(Vec3::ZERO, absorption),
+        }))
     }
 
     fn ior(&mut self) -> Check<f32> {
@@ -137,27 +143,7 @@ impl Reader<'_> {
         Ok(not_negative("emissiveFactor times emissiveStrength", emission)?.into())
     }
 
-    fn warn_of_glass(&mut self, transmission: f32, roughness: f32) {
-        if transmission < 1.0 {
-            self.warn(format!(
-                "transmissionFactor {transmission}, below 1, isn't supported yet; it is rendered as clear glass"
-            ));
-        }
-        if roughness > 0.0 {
-            self.warn(format!(
-                "transmission with roughness {roughness} isn't supported yet; it is rendered smooth"
-            ));
-        }
-        let volume = self.extension(|extensions| extensions.volume.as_ref());
-        if volume.is_none_or(|volume| volume.thickness_factor.0 == 0.0) {
-            self.warn(
-                "transmission without a KHR_materials_volume thickness is a thin wall in glTF, which isn't supported \
-                 yet; it is rendered as the boundary of a solid"
-                    .into(),
-            );
-        } else if volume.is_some_and(absorbs) {
-            self.warn("absorption (attenuationColor) isn't supported yet and is left out".into());
-        }
+    fn warn_of_glass(&mut self) {
         let specular = self.extension(|extensions| extensions.specular.as_ref());
         let is_changed = |specular: &json::extensions::material::Specular| {
             specular.specular_factor.0 != 1.0 || specular.specular_color_factor.0 != [1.0; 3]
@@ -254,9 +240,12 @@ impl Reader<'_> {
     }
 }
 
-/// Whether light that passes through loses any.
-fn absorbs(volume: &Volume) -> bool {
-    volume.attenuation_distance.0.is_finite() && volume.attenuation_color.0 != [1.0; 3]
+/// Beer's absorption coefficient: light keeps attenuationColor over attenuationDistance. 1/scene unit.
+fn absorption(volume: &Volume) -> Vec3 {
+    // A black channel keeps next to nothing, and no infinity gets into the kernels.
+    const DARKEST: f32 = 1e-10;
+    let color = Vec3::from(volume.attenuation_color.0).max(Vec3::splat(DARKEST));
+    -color.map(f32::ln) / volume.attenuation_distance.0
 }
 
 /// Checks that no value is negative, infinite or not a number.

@@ -53,13 +53,41 @@ pub enum Surface {
     Matte,
     /// Perfect mirror: Schlick's Fresnel with the base colour as reflectance at normal incidence.
     Mirror,
-    /// Smooth boundary of a dielectric.
-    Dielectric {
-        /// Index of refraction inside, relative to vacuum.
-        ior: f32,
-    },
+    /// Boundary of a dielectric.
+    Dielectric(Dielectric),
     /// A Lambertian base under a boundary of microfacets: glTF 2.0, appendix B.
     Glossy(Gloss),
+}
+
+/// What passes light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dielectric {
+    /// Index of refraction inside, relative to vacuum.
+    pub ior: f32,
+    /// Its square is GGX's α; 0 ..= 1.
+    pub roughness: f32,
+    /// Share of the surface that passes light, 0 ..= 1.
+    pub transmission: f32,
+    /// How the rest reflects.
+    pub gloss: Gloss,
+    /// A wall without an inside, which doesn't bend light.
+    pub thin: bool,
+    /// Absorption coefficient inside, linear RGB, 1/render unit.
+    pub absorption: Vec3,
+}
+
+impl Dielectric {
+    /// Smooth and clear.
+    pub fn clear(ior: f32) -> Self {
+        Self {
+            ior,
+            roughness: 0.0,
+            transmission: 1.0,
+            gloss: Gloss::default(),
+            thin: false,
+            absorption: Vec3::ZERO,
+        }
+    }
 }
 
 /// How a boundary of microfacets reflects.

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::object_grid::object_grids;
-use super::{Gloss, Scene, Surface, bvh, contact};
+use super::{Dielectric, Gloss, Scene, Surface, bvh, contact};
 use crate::layout::{
     BvhRecord, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, SMOOTH_SHADED, ShadingTriangle, TOUCHED,
 };
@@ -120,24 +120,26 @@ fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTr
 }
 
 fn material(material: &super::Material) -> Material {
-    let (mut surface, mut ior, mut gloss) = (0, 1.0, Gloss::default());
-    match material.surface {
-        Surface::Matte => {}
-        Surface::Mirror => surface = MIRROR,
-        Surface::Dielectric { ior: inside } => (surface, ior) = (DIELECTRIC, inside),
-        Surface::Glossy(of_surface) => (surface, gloss) = (GLOSSY, of_surface),
-    }
+    let (surface, glass, gloss) = match material.surface {
+        Surface::Matte => (0, None, Gloss::default()),
+        Surface::Mirror => (MIRROR, None, Gloss::default()),
+        Surface::Dielectric(glass) => (DIELECTRIC, Some(glass), glass.gloss),
+        Surface::Glossy(gloss) => (GLOSSY, None, gloss),
+    };
+    let inside = glass.unwrap_or(Dielectric::clear(1.0));
     Material {
         base_color: material.base_color.to_array(),
         surface,
         emission: material.emission.to_array(),
-        ior,
+        ior: inside.ior,
         double_sided: material.double_sided.into(),
         metallic: gloss.metallic,
-        roughness: gloss.roughness,
-        padding: 0,
+        roughness: glass.map_or(gloss.roughness, |glass| glass.roughness),
+        transmission: inside.transmission,
         specular_f0: gloss.specular_f0.to_array(),
         specular_f90: gloss.specular_f90,
+        absorption: inside.absorption.to_array(),
+        thin: inside.thin.into(),
     }
 }
 

@@ -55,6 +55,7 @@ fn both_backends_render_the_same_picture() {
         ("pool", Estimator::Sppm, Direct::Light),
         ("glossy", Estimator::Sppm, Direct::Light),
         ("glossy", Estimator::Ppm, Direct::Photons),
+        ("glasses", Estimator::Sppm, Direct::Light),
     ] {
         let config = RenderConfig {
             estimator,

@@ -69,7 +69,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize) {
 
 #[test]
 fn camera_paths_end_where_the_cpus_end() {
-    for name in ["cornell-spheres", "ring", "glossy"] {
+    for name in ["cornell-spheres", "ring", "glossy", "glasses"] {
         assert_camera_agrees(name, small(), 3000);
     }
 }

@@ -121,7 +121,7 @@ fn light_and_viewer_may_change_places() {
 }
 
 /// ∫ BRDF · cos by the microfacet normals' own measure, and the base's by angle.
-fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
+pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
     let (n, v) = (DVec3::Z, viewer(cosine));
     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(steps);
     let base = Reflector {

@@ -41,6 +41,18 @@ pub fn mirror(name: &str, [r, g, b]: [f64; 3]) -> Value {
     })
 }
 
+/// A dielectric of index 1.5, of which a part is clear; attenuation colour and distance inside, or a thin wall.
+pub fn glass(name: &str, roughness: f64, transmission: f64, inside: Option<([f64; 3], f64)>) -> Value {
+    let mut material = metallic_roughness(name, [1.0; 3], 0.0, roughness);
+    material["extensions"] = json!({ "KHR_materials_transmission": { "transmissionFactor": transmission } });
+    if let Some((color, distance)) = inside {
+        material["extensions"]["KHR_materials_volume"] = json!({
+            "thicknessFactor": 1.0, "attenuationColor": color, "attenuationDistance": distance
+        });
+    }
+    material
+}
+
 /// A surface of microfacets.
 pub fn metallic_roughness(name: &str, [r, g, b]: [f64; 3], metallic: f64, roughness: f64) -> Value {
     json!({

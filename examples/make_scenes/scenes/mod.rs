@@ -3,7 +3,7 @@
 mod document;
 mod mesh;
 
-use document::{Document, File, clear, emitting, light, matte, metallic_roughness, mirror, one_sided};
+use document::{Document, File, clear, emitting, glass, light, matte, metallic_roughness, mirror, one_sided};
 use glam::{DVec3, dvec3};
 use mesh::Mesh;
 
@@ -18,6 +18,7 @@ pub fn all() -> Vec<File> {
         cornell(),
         cornell_spheres(),
         glossy(),
+        glasses(),
         ring(),
         pool("pool", false),
         pool("pool-tiles", true),
@@ -71,6 +72,25 @@ fn glossy() -> Document {
         metallic_roughness("polished", [0.9, 0.9, 0.92], 1.0, 0.2),
         metallic_roughness("plastic", [0.15, 0.3, 0.7], 0.0, 0.35),
         metallic_roughness("lacquer", [0.6, 0.08, 0.06], 0.0, 0.0),
+    ];
+    let sphere = Mesh::icosphere(0.3, 4);
+    let places = [[-0.6, -0.4], [0.1, -0.55], [-0.25, 0.35], [0.5, 0.25]];
+    for (material, [x, z]) in materials.into_iter().zip(places) {
+        let material = scene.material(material);
+        scene.object("sphere", &sphere, material).at([x, 0.3005, z]);
+    }
+    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
+    scene
+}
+
+/// The same room with spheres of tinted, frosted, thin and half clear glass.
+fn glasses() -> Document {
+    let mut scene = cornell_room("glasses");
+    let materials = [
+        glass("tinted", 0.0, 1.0, Some(([0.1, 0.6, 0.3], 0.4))),
+        glass("frosted", 0.35, 1.0, Some(([1.0; 3], 1.0))),
+        glass("thin", 0.0, 1.0, None),
+        glass("half-clear", 0.2, 0.6, Some(([0.9, 0.7, 0.2], 0.5))),
     ];
     let sphere = Mesh::icosphere(0.3, 4);
     let places = [[-0.6, -0.4], [0.1, -0.55], [-0.25, 0.35], [0.5, 0.25]];
