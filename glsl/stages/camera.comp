@@ -49,15 +49,18 @@ struct Glimpse {
     bool dark; // nothing is there that scatters light
 };
 
-Glimpse glimpse(vec3 origin, vec3 direction, uint ignored) {
+Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium) {
     Hit hit = trace(origin, direction, 1e30, ignored, false);
     if (loops_cut || hit.triangle == MISS) {
         return Glimpse(vec3(0.0), true);
     }
-    Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
-    Material material = material_at(surface.material);
-    bool dark = is_matte(material) && largest(material.base_color) == 0.0;
-    return Glimpse(emits(material, face(surface, direction).front) ? material.emission : vec3(0.0), dark);
+    Encounter met = encounter(hit, direction, medium);
+    bool dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
+    vec3 emission = emits(met.material, met.facing.front) ? met.material.emission : vec3(0.0);
+    if (ABSORPTION) {
+        emission *= transmittance(met.through, hit.t);
+    }
+    return Glimpse(emission, dark);
 }
 
 // Follows what a boundary of microfacets reflects, or none of it where that would fly into the surface.
@@ -183,7 +186,7 @@ void main() {
                         // A lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
                         branch.reflection_seen = true;
                         vec3 from = origin_towards(surface, boundary.reflected);
-                        Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle);
+                        Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle, met.through);
                         branch.emitted += branch.throughput * boundary.reflectance * boundary.reflected_weight *
                                           reflection.emission;
                         if (reflection.dark) {

@@ -34,6 +34,27 @@ const uint WHOLE = 16u;
 // Surfaces that are crossed on the way at the most.
 const uint MOST_CROSSINGS = 4u;
 
+// The side of an object that a ray meets.
+struct Side {
+    uint object;
+    bool front;
+};
+
+Side side_of(Surface surface, vec3 direction) {
+    return Side(surface.object, dot(surface.geometric_normal, direction) < 0.0);
+}
+
+// Whether a ray leaves the object that was entered at that side.
+bool leaves(vec3 origin, vec3 direction, uint ignored, Side entered) {
+    Hit hit = trace(origin, direction, 1e30, ignored, false);
+    bool left = false;
+    if (hit.triangle != MISS) {
+        Side side = side_of(surface_at(hit.triangle, vec2(hit.u, hit.v)), direction);
+        left = side.object == entered.object && side.front != entered.front;
+    }
+    return left;
+}
+
 bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     uint object = floatBitsToUint(visible_point.position_object.w);
     vec3 n = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
@@ -43,6 +64,7 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     vec3 along = basis(n) * vec3(r * cos(phi), r * sin(phi), 0.0);
     // Along the surface, into other objects and out of them again.
     bool inside = false;
+    Side entered;
     uint ignored = MISS;
     float done = 0.0;
     for (uint i = 0u; i < MOST_CROSSINGS; i++) {
@@ -50,16 +72,20 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
         if (hit.triangle == MISS) {
             break;
         }
-        ShadingTriangle met = shading_triangle(hit.triangle);
-        if (met.object == object) {
+        Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
+        if (surface.object == object) {
             return true; // the surface bends up
         }
         // Light passes glass.
-        inside = inside != !is_dielectric(material_at(met.material));
+        if (!is_dielectric(material_at(surface.material))) {
+            inside = !inside;
+            entered = side_of(surface, along);
+        }
         done += hit.t * (1.0 - done);
         ignored = hit.triangle;
     }
-    if (inside) {
+    // An open sheet has been crossed, but encloses nothing.
+    if (inside && leaves(origin + along, along, ignored, entered) && leaves(origin + along, n, ignored, entered)) {
         return false;
     }
     // Then down: it may bend, but it must be there, under glass that lies on it too.

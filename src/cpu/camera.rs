@@ -36,15 +36,15 @@ struct Branch {
 }
 
 /// Radiance of the first surface on a ray's way, and whether nothing is there that scatters light.
-fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>) -> (DVec3, bool) {
+fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u32>) -> (DVec3, bool) {
     let Some(hit) = nearest_hit(inputs, ray, FAR, ignored) else {
         return (DVec3::ZERO, true);
     };
-    let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
-    let material = surface.material;
+    let met = Encounter::new(inputs, hit, ray.direction, medium);
+    let material = met.surface.material;
     let dark = material.surface == MATTE && rgb(material.base_color).max_element() == 0.0;
-    if emits(material, Facing::new(&surface, ray.direction).front) {
-        (rgb(material.emission), dark)
+    if emits(material, met.facing.front) {
+        (rgb(material.emission) * transmittance(inputs, met.through, hit.t), dark)
     } else {
         (DVec3::ZERO, dark)
     }
@@ -275,7 +275,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                                 origin: surface.origin_towards(boundary.reflected),
                                 direction: boundary.reflected,
                             };
-                            let (emission, dark) = glimpse(inputs, ray, Some(surface.triangle));
+                            let (emission, dark) = glimpse(inputs, ray, Some(surface.triangle), met.through);
                             branch.emitted +=
                                 branch.throughput * boundary.reflectance * boundary.reflected_weight * emission;
                             if dark {

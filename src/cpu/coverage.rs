@@ -5,12 +5,12 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::Inputs;
 use super::intersect::{Ray, nearest_hit};
 use super::random::{PathKind, Random};
 use super::sampling::{basis, decode_direction};
-use super::surface::{DIELECTRIC, offset_origin, reach_of};
+use super::surface::{DIELECTRIC, Surface, offset_origin, reach_of, surface_at};
 use super::vector::{word, xyz};
+use super::{FAR, Inputs};
 use crate::layout::{Coverage, NO_OBJECT, Statistics, VisiblePoint};
 
 /// What an iteration counts for, whatever its points.
@@ -44,6 +44,22 @@ pub fn coverage(
     });
 }
 
+/// The side of an object that a ray meets.
+#[derive(Clone, Copy)]
+struct Side {
+    object: u32,
+    front: bool,
+}
+
+impl Side {
+    fn of(surface: &Surface<'_>, direction: DVec3) -> Self {
+        Self {
+            object: surface.object,
+            front: surface.geometric_normal.dot(direction) < 0.0,
+        }
+    }
+}
+
 fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f64, v: f64) -> bool {
     let object = word(point.position_object);
     let object_of = |triangle: u32| inputs.scene.shading_triangles[triangle as usize].object;
@@ -57,7 +73,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
     let r = radius * u.sqrt();
     let along = basis(n) * DVec3::new(r * cos, r * sin, 0.0);
     // Along the surface, into other objects and out of them again.
-    let (mut inside, mut ignored, mut done) = (false, None, 0.0);
+    let (mut entered, mut ignored, mut done) = (None, None, 0.0);
     for _ in 0..MOST_CROSSINGS {
         let ray = Ray {
             origin: origin + done * along,
@@ -66,13 +82,31 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
         let Some(hit) = nearest_hit(inputs, ray, 1.0, ignored) else {
             break;
         };
-        if object_of(hit.triangle) == object {
+        let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+        if surface.object == object {
             return true; // the surface bends up
         }
         // Light passes glass.
-        inside ^= surface_of(hit.triangle) != DIELECTRIC;
+        if surface.material.surface != DIELECTRIC {
+            let side = Side::of(&surface, along);
+            entered = if entered.is_none() { Some(side) } else { None };
+        }
         done += hit.t * (1.0 - done);
         ignored = Some(hit.triangle);
+    }
+    // An open sheet has been crossed, but encloses nothing.
+    let leaves = |direction: DVec3, entered: Side| {
+        let ray = Ray {
+            origin: origin + along,
+            direction,
+        };
+        nearest_hit(inputs, ray, FAR, ignored).is_some_and(|hit| {
+            let left = Side::of(&surface_at(inputs.scene, hit.triangle, hit.u, hit.v), direction);
+            left.object == entered.object && left.front != entered.front
+        })
+    };
+    if entered.is_some_and(|entered| leaves(along, entered) && leaves(n, entered)) {
+        return false;
     }
     // Then down: it may bend, but it must be there, under glass that lies on it too.
     let down = Ray {
@@ -86,5 +120,5 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
     {
         below = nearest_hit(inputs, down, 1.0, Some(hit.triangle));
     }
-    !inside && below.is_some_and(|hit| object_of(hit.triangle) == object)
+    below.is_some_and(|hit| object_of(hit.triangle) == object)
 }

@@ -122,6 +122,28 @@ fn two_faces_in_one_place_are_as_bright_as_one() {
     assert_patch_is_right("two faces alike", &patch(alike, WIDE));
 }
 
+/// Inside a block there are no photons; on both sides of a sheet there are.
+#[test]
+fn what_stands_on_a_patch_hides_what_is_under_it_and_no_more() {
+    let [corner, a, b] = corners(0.5);
+    // What stands there shines as the walls do, so that the light in the room stays even.
+    let with_sheet = |model: &mut Model, matte| {
+        model.quad(matte, corner, a, b);
+        let sheet = model.black(1.0);
+        model
+            .file
+            .set(&format!("/materials/{sheet}/doubleSided"), serde_json::json!(true));
+        model.quad(sheet, Vec3::new(0.08, -0.4, 0.0), Vec3::Y * 0.8, Vec3::Z * 0.5);
+    };
+    let with_block = |model: &mut Model, matte| {
+        model.quad(matte, corner, a, b);
+        let block = model.black(1.0);
+        model.block(block, Vec3::new(0.08, -0.4, 0.0), Vec3::new(0.4, 0.4, 0.5));
+    };
+    assert_patch_is_right("beside a sheet", &patch(with_sheet, WIDE));
+    assert_patch_is_right("beside a block", &patch(with_block, WIDE));
+}
+
 #[test]
 fn two_thousand_triangles_in_one_place_fit_into_the_hierarchy() {
     let [corner, a, b] = corners(0.5);

@@ -230,6 +230,30 @@ fn glass_beside_glass_of_any_index_is_invisible_in_uniform_light_with_a_gap_or_w
     }
 }
 
+/// A block of glass lies on a shining wall. From inside, straight up, its other face shows 4 % of the wall's light in a mirror
+/// and n² times the other 96 % of the light outside, whichever of the two faces in one place a ray meets first.
+#[test]
+fn a_shining_wall_that_glass_lies_on_is_seen_mirrored_in_it() {
+    let mut model = shining_room();
+    let glass = model.glass(IOR);
+    model.block(glass, Vec3::new(-0.5, -0.5, -1.0), Vec3::new(0.5, 0.5, 0.0));
+    model.camera(Vec3::new(0.05, 0.03, -0.5), Vec3::new(0.05, 0.03, 0.0), 0.01);
+    model
+        .file
+        .add_parent(json!({"rotation": [0.1825742, 0.3651484, 0.5477226, 0.7302967]}));
+    let scene = model.scene();
+    let config = square(48, 1000);
+    let on_device = render(&scene, 0, 2, config.clone()).image;
+    let packed = PackedScene::new(&scene).expect("packed scene");
+    let mut twin = cpu::Renderer::new(&packed, &scene.cameras[0], config).expect("renderer");
+    twin.iterate().expect("iteration");
+    let expected = 0.96 * IOR * IOR + 0.04;
+    for (image, by) in [(on_device, "device"), (twin.resolve().expect("picture"), "CPU")] {
+        let wrong = image.pixels().iter().filter(|pixel| (pixel[0] - expected).abs() > 1e-4);
+        assert_eq!(wrong.count(), 0, "{by}: pixels that aren't {expected}");
+    }
+}
+
 /// A room of mirrors that reflect all: a path ends at the lamp or at the bounce limit. Whatever reaches neither the picture
 /// nor the lamp is counted.
 #[test]
