@@ -43,11 +43,20 @@ pub trait Backend {
 pub struct Resolved {
     /// The picture.
     pub image: Image,
-    /// Of each pixel, its photons' flux weighed with 1 − 2 distance²/R², as radiance: see [`crate::estimate`].
+    /// Of each pixel, its photons' flux weighed with 1 − 2 distance²/R², as radiance: see [`crate::estimate`]. Infinite where
+    /// no photon has come yet.
     pub curvature: Vec<f32>,
 }
 
 impl Resolved {
+    /// Pixels that see a surface to which no photon has come yet.
+    pub fn without_photons(&self) -> usize {
+        self.curvature
+            .iter()
+            .filter(|curvature| curvature.is_infinite())
+            .count()
+    }
+
     /// From a renderer's film: RGB and curvature, in rows from the top left.
     pub fn from_film(resolution: [u32; 2], film: &[[f32; 4]]) -> Self {
         Self {

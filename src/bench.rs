@@ -12,7 +12,7 @@ mod scaling;
 mod structure;
 mod tables;
 
-pub use converge::{Converge, Convergence, Curve, Measured, converge, converge_table, csv, seconds_to};
+pub use converge::{Converge, Convergence, Curve, Measured, Reached, converge, converge_table, csv, seconds_to};
 pub use gather::{GatherBench, MethodResult, ResolutionResult, Results, StepTimes};
 pub use plot::{plot_convergence, plot_methods, plot_scaling};
 pub use random::{Across, Battery, ChiSquare, LIMIT, battery, battery_table};
@@ -31,8 +31,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
-/// Slope of the line through the points, in logarithms, by least squares; NaN with fewer than two.
-fn log_slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
+/// Slope of the line through the points, in logarithms, by least squares; `None` with fewer than two.
+fn log_slope(points: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
     let logs: Vec<(f64, f64)> = points.map(|(x, y)| (x.ln(), y.ln())).collect();
     let count = logs.len() as f64;
     let (mean_x, mean_y) = (
@@ -41,7 +41,12 @@ fn log_slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
     );
     let covariance: f64 = logs.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
     let variance: f64 = logs.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
-    covariance / variance
+    (logs.len() > 1 && variance > 0.0).then_some(covariance / variance)
+}
+
+/// A slope for people.
+fn slope_text(slope: Option<f64>) -> String {
+    slope.map_or("unknown".to_owned(), |slope| format!("{slope:.2}"))
 }
 
 #[cfg(test)]
@@ -49,6 +54,8 @@ mod tests {
     #[test]
     fn the_slope_of_a_power_is_its_exponent() {
         let points = [1.0, 10.0, 1e3].map(|x: f64| (x, 7.0 * x.powf(1.5)));
-        assert!((super::log_slope(points.into_iter()) - 1.5).abs() < 1e-12);
+        let slope = super::log_slope(points.into_iter()).expect("a slope");
+        assert!((slope - 1.5).abs() < 1e-12);
+        assert_eq!(super::log_slope(std::iter::once((2.0, 3.0))), None);
     }
 }

@@ -10,9 +10,11 @@
 //! sign. (Hachisuka and others, «A Progressive Error Estimation Framework for Photon Density Estimation», 2010, have the same
 //! two parts, and derivatives from a kernel of their own.)
 
-use crate::backend::Resolved;
+use crate::backend::{Backend, Resolved};
+use crate::config::RenderConfig;
 use crate::film::Image;
 use crate::metrics::REL_MSE_FLOOR;
+use crate::scene::PackedScene;
 
 /// Batches at the most; then neighbours are joined. Even, so that the halves are alike.
 const MOST_BATCHES: usize = 8;
@@ -26,6 +28,8 @@ const BIAS_PER_CURVATURE: f64 = 4.05;
 #[derive(Debug)]
 pub struct ErrorEstimate {
     alpha: f64,
+    /// Radiance that a photon gives a pixel in an iteration, see [`of_one_photon`].
+    photon: f64,
     /// Iterations of a batch.
     batch: u32,
     /// Pictures after 1, 2, … batches.
@@ -43,11 +47,56 @@ pub struct RelativeError {
     pub bias: f64,
 }
 
+/// Radiance that a photon of average power gives a white surface in one iteration, at the initial radius. That none has come
+/// to a pixel is a number that may as well have been one: what one would give is the standard error there.
+pub fn of_one_photon(scene: &PackedScene, backend: &dyn Backend, config: &RenderConfig) -> f64 {
+    let radius2 = f64::from(backend.radius()).powi(2);
+    scene.power / f64::from(config.photons) / (std::f64::consts::PI.powi(2) * radius2)
+}
+
+/// The squared errors of each pixel after some iterations.
+struct Parts {
+    /// Of each channel, as the last picture has it.
+    values: Vec<[f64; 3]>,
+    /// Of each channel.
+    noise2: Vec<[f64; 3]>,
+    /// Of the mean of the channels; of noise alone it is 0 on average.
+    bias2: Vec<f64>,
+    /// relMSE's denominator beside the square.
+    floor: f64,
+}
+
+impl Parts {
+    /// A channel's bias is in proportion to its value; its square over the pixel's.
+    fn share2(values: &[f64; 3]) -> [f64; 3] {
+        let mean = values.iter().sum::<f64>() / 3.0;
+        values.map(|value| if mean > 0.0 { (value / mean).powi(2) } else { 0.0 })
+    }
+
+    /// Part of relMSE of these squared biases.
+    fn relative_bias2(&self, bias2: &[f64]) -> f64 {
+        let of_pixel = |(values, bias2): (&[f64; 3], &f64)| {
+            let shares = Self::share2(values).into_iter().zip(values);
+            let weighed: f64 = shares.map(|(share, value)| share / (value * value + self.floor)).sum();
+            bias2 * weighed
+        };
+        self.values.iter().zip(bias2).map(of_pixel).sum::<f64>() / (3 * self.values.len()) as f64
+    }
+
+    /// Part of relMSE of the noise.
+    fn relative_noise2(&self) -> f64 {
+        let pairs = self.values.as_flattened().iter().zip(self.noise2.as_flattened());
+        let sum: f64 = pairs.map(|(value, noise2)| noise2 / (value * value + self.floor)).sum();
+        sum / (3 * self.values.len()) as f64
+    }
+}
+
 impl ErrorEstimate {
-    /// Before the first iteration of a render with eq. 2's α.
-    pub fn new(alpha: f32) -> Self {
+    /// Before the first iteration of a render with eq. 2's α; `photon` is [`of_one_photon`].
+    pub fn new(alpha: f32, photon: f64) -> Self {
         Self {
             alpha: f64::from(alpha),
+            photon,
             batch: 1,
             pictures: Vec::new(),
         }
@@ -92,54 +141,49 @@ impl ErrorEstimate {
         (mean, squares / (count * (count - 1)) as f64)
     }
 
-    /// Each channel of each pixel: value, and squared standard error.
-    fn values(pictures: &[Resolved]) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let count = pictures.len();
-        let samples = pictures[0].curvature.len() * 3;
-        (0..samples)
-            .map(move |index| Self::mean_and_noise2(|n| pictures[n].image.pixels().as_flattened()[index], count))
-    }
-
-    /// The squared bias of each pixel, in the mean of its channels; of noise alone it is 0 on average.
-    fn bias2(pictures: &[Resolved]) -> impl Iterator<Item = f64> + '_ {
-        let count = pictures.len();
-        (0..pictures[0].curvature.len()).map(move |pixel| {
-            let (mean, noise2) = Self::mean_and_noise2(|n| pictures[n].curvature[pixel], count);
-            (mean * mean - noise2) * BIAS_PER_CURVATURE.powi(2)
-        })
-    }
-
-    /// The estimate after so many iterations; `None` before there are enough.
-    pub fn relative(&self, iterations: u32) -> Option<RelativeError> {
+    /// What is known after so many iterations; `None` before there are enough, and while the picture is black.
+    fn parts(&self, iterations: u32) -> Option<Parts> {
         let pictures = self.batches()?;
-        let values: Vec<(f64, f64)> = Self::values(pictures).collect();
-        let count = values.len() as f64;
-        let mean = values.iter().map(|(value, _)| value).sum::<f64>() / count;
-        let floor = REL_MSE_FLOOR * mean * mean;
-        if floor == 0.0 {
-            return Some(RelativeError {
-                total: 0.0,
-                noise: 0.0,
-                bias: 0.0,
-            });
-        }
-        let (mut noise2, mut bias2) = (0.0, 0.0);
-        for (channels, bias) in values.chunks_exact(3).zip(Self::bias2(pictures)) {
-            let mean = channels.iter().map(|(value, _)| value).sum::<f64>() / 3.0;
-            for (value, noise) in channels {
-                let weight = 1.0 / (value * value + floor);
-                noise2 += noise * weight;
-                // Each channel has its share of the bias.
-                if mean > 0.0 {
-                    bias2 += bias * (value / mean).powi(2) * weight;
-                }
-            }
-        }
+        let count = pictures.len();
         // Since the last picture the noise has fallen as n^−α, the bias as n^(α−1).
-        let taken = f64::from(self.batch) * pictures.len() as f64;
+        let taken = f64::from(self.batch) * count as f64;
         let since = f64::from(iterations.max(1)) / taken;
-        let noise2 = noise2 / count * since.powf(-self.alpha);
-        let bias2 = (bias2 / count).max(0.0) * since.powf(2.0 * (self.alpha - 1.0));
+        let (fallen_noise, fallen_bias) = (since.powf(-self.alpha), since.powf(2.0 * (self.alpha - 1.0)));
+        let photon2 = (self.photon / taken).powi(2);
+        let mut parts = Parts {
+            values: Vec::new(),
+            noise2: Vec::new(),
+            bias2: Vec::new(),
+            floor: 0.0,
+        };
+        for (pixel, last) in pictures[count - 1].curvature.iter().enumerate() {
+            let without_photons = last.is_infinite();
+            let channels = [0, 1, 2]
+                .map(|channel: usize| Self::mean_and_noise2(|n| pictures[n].image.pixels()[pixel][channel], count));
+            let (curvature, curvature_noise2) = Self::mean_and_noise2(
+                |n| {
+                    let curvature = pictures[n].curvature[pixel];
+                    if curvature.is_finite() { curvature } else { 0.0 }
+                },
+                count,
+            );
+            parts.values.push(channels.map(|(value, _)| value));
+            parts.noise2.push(
+                channels.map(|(_, noise2)| (noise2 + if without_photons { photon2 } else { 0.0 }) * fallen_noise),
+            );
+            let bias2 = (curvature * curvature - curvature_noise2) * BIAS_PER_CURVATURE.powi(2);
+            parts.bias2.push(bias2 * fallen_bias);
+        }
+        let mean = parts.values.as_flattened().iter().sum::<f64>() / (3 * parts.values.len()) as f64;
+        parts.floor = REL_MSE_FLOOR * mean * mean;
+        (parts.floor > 0.0).then_some(parts)
+    }
+
+    /// The estimate after so many iterations; `None` before there are enough, and while the picture is black.
+    pub fn relative(&self, iterations: u32) -> Option<RelativeError> {
+        let parts = self.parts(iterations)?;
+        let noise2 = parts.relative_noise2();
+        let bias2 = parts.relative_bias2(&parts.bias2).max(0.0);
         Some(RelativeError {
             total: (noise2 + bias2).sqrt(),
             noise: noise2.sqrt(),
@@ -147,20 +191,23 @@ impl ErrorEstimate {
         })
     }
 
-    /// The error of each pixel by noise and bias, root of the mean square, in units of radiance; `None` before there are
-    /// enough iterations. A pixel's bias is that of the pixels around it: its own is all but lost in noise.
-    pub fn of_pixels(&self) -> Option<Image> {
-        let pictures = self.batches()?;
-        let last = &pictures[pictures.len() - 1].image;
-        let values: Vec<(f64, f64)> = Self::values(pictures).collect();
-        let bias2 = mean_around(&Self::bias2(pictures).collect::<Vec<_>>(), last.width());
-        let pixels = values.as_chunks::<3>().0.iter().zip(bias2);
-        let pixels = pixels.map(|(channels, bias2)| {
-            let mean = channels.iter().map(|(value, _)| value).sum::<f64>() / 3.0;
-            channels.map(|(value, noise2)| {
-                let share = if mean > 0.0 { value / mean } else { 0.0 };
-                (noise2 + bias2.max(0.0) * share * share).sqrt() as f32
-            })
+    /// The error of each pixel by noise and bias, root of the mean square, in units of radiance; `None` as in
+    /// [`ErrorEstimate::relative`], whose error is that of all these together. A pixel's bias is that of the pixels around it:
+    /// its own is all but lost in noise.
+    pub fn of_pixels(&self, iterations: u32) -> Option<Image> {
+        let parts = self.parts(iterations)?;
+        let last = &self.pictures.last()?.image;
+        let around: Vec<f64> = mean_around(&parts.bias2, last.width())
+            .into_iter()
+            .map(|bias2| bias2.max(0.0))
+            .collect();
+        // What noise made negative is missing: without this the picture's error were smaller than that of its pixels.
+        let [whole, of_pixels] = [&parts.bias2, &around].map(|bias2| parts.relative_bias2(bias2).max(0.0));
+        let scale = if of_pixels > 0.0 { whole / of_pixels } else { 0.0 };
+        let pixels = parts.values.iter().zip(&parts.noise2).zip(around);
+        let pixels = pixels.map(|((values, noise2), bias2)| {
+            let share2 = Parts::share2(values);
+            [0, 1, 2].map(|channel: usize| (noise2[channel] + scale * bias2 * share2[channel]).sqrt() as f32)
         });
         Some(Image::new(last.width(), last.height(), pixels.collect()))
     }
@@ -195,7 +242,7 @@ mod tests {
     /// `bias`·i^(α−1) in iteration i, and the curvature that smooth light of that bias has, as noisy as the picture.
     fn rendered(iterations: u32, deviation: f64, bias: f64, alpha: f32) -> (ErrorEstimate, f64) {
         const PIXELS: usize = 2000;
-        let mut estimate = ErrorEstimate::new(alpha);
+        let mut estimate = ErrorEstimate::new(alpha, 0.0);
         let mut sums = vec![[0.0f64; 4]; PIXELS];
         let mut last = Vec::new();
         for i in 1..=iterations {
@@ -248,20 +295,40 @@ mod tests {
     fn the_error_of_pixels_has_noise_and_bias_and_its_mean_square_is_that_of_the_picture() {
         let (estimate, _) = rendered(192, 0.1, 0.1, 2.0 / 3.0);
         let picture = estimate.relative(192).expect("an estimate");
-        let pixels = estimate.of_pixels().expect("errors");
+        let pixels = estimate.of_pixels(192).expect("errors");
         let samples = pixels.pixels().as_flattened();
         let mean_square = samples.iter().map(|&error| f64::from(error).powi(2)).sum::<f64>() / samples.len() as f64;
-        // Values of 1 with relMSE's floor. A negative squared bias, which noise makes, counts 0 in a pixel.
-        let found = (mean_square / 1.01).sqrt();
+        // All pixels have about one value, and relMSE's floor is a hundredth of its square.
+        let [value, ..] = crate::metrics::mean(&estimate.pictures[estimate.pictures.len() - 1].image);
+        let found = (mean_square / 1.01).sqrt() / value;
         assert!(
-            (found / picture.total - 1.0).abs() < 0.05,
+            (found / picture.total - 1.0).abs() < 0.01,
             "{found}, of the picture {picture:?}"
         );
     }
 
     #[test]
+    fn a_black_picture_has_no_estimate_and_pixels_without_photons_may_lack_one() {
+        let taken = |pixels: &[[f32; 4]]| {
+            let mut estimate = ErrorEstimate::new(0.5, 6.0);
+            (1..=8).for_each(|i| estimate.add(i, Resolved::from_film([2, 1], pixels)));
+            estimate.relative(8)
+        };
+        assert_eq!(taken(&[[0.0; 4]; 2]), None);
+        let lit = [1.0, 1.0, 1.0, 0.0];
+        assert_eq!(taken(&[lit; 2]).expect("an estimate").total, 0.0);
+        // Half of the pixels, each off by what one photon gives in eight iterations, against a hundredth of the mean's square.
+        let half = taken(&[lit, [0.0, 0.0, 0.0, f32::INFINITY]]).expect("an estimate");
+        let expected = (0.5 * 0.75f64.powi(2) / (0.01 * 0.25)).sqrt();
+        assert!(
+            (half.noise / expected - 1.0).abs() < 1e-9,
+            "{half:?}, {expected} expected"
+        );
+    }
+
+    #[test]
     fn the_first_iterations_give_no_estimate_and_memory_stays_bounded() {
-        let mut estimate = ErrorEstimate::new(0.5);
+        let mut estimate = ErrorEstimate::new(0.5, 0.0);
         for i in 1..=1000 {
             assert_eq!(
                 estimate.relative(i).is_some(),

@@ -58,7 +58,7 @@ impl Image {
 }
 
 /// How a picture was made; written into the EXR file's header.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Metadata {
     /// Iterations done.
     pub iterations: u64,

@@ -272,7 +272,7 @@ fn outputs_overwrite_neither_each_other_nor_the_scene() {
     );
     assert_fails(
         &folder,
-        &small_render(folder.path(), &copy, &["-o", "x", "--png", "./x"]),
+        &small_render(folder.path(), &copy, &["-o", "x.png", "--png", "./x.png"]),
         &["overwrite"],
     );
     let output = small_render(folder.path(), &copy, &[]);

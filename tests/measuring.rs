@@ -102,6 +102,31 @@ fn compare_measures_a_picture_against_its_reference() {
 }
 
 #[test]
+fn compare_tells_of_nan_in_json_too() {
+    let folder = TempDir::new().expect("folder");
+    let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/references/cornell.exr");
+    let mut image = ppm_vk::film::read_exr(std::path::Path::new(reference)).expect("the reference");
+    let mut pixels = image.pixels().to_vec();
+    pixels[7][1] = f32::NAN;
+    image = ppm_vk::film::Image::new(image.width(), image.height(), pixels);
+    let metadata = ppm_vk::film::Metadata::default();
+    ppm_vk::film::write_exr(&image, None, &folder.path().join("nan.exr"), &metadata).expect("a file");
+    let output = ppm_vk(folder.path(), &["compare", "nan.exr", reference, "--json"]);
+    assert!(
+        stderr(&output).contains("nan.exr: 1 pixels with NaN"),
+        "{}",
+        stderr(&output)
+    );
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(value["defects"]["image"]["nan"], 1);
+    assert_eq!(value["defects"]["reference"]["nan"], 0);
+    assert!(value["flip"].is_null() && value["rel_mse"].is_null(), "{value}");
+    let refused = ppm_vk(folder.path(), &["compare", "nan.exr", reference, "--heatmap", "e.jpg"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains(".png"), "{}", stderr(&refused));
+}
+
+#[test]
 fn converge_follows_the_error_of_each_setting() {
     let folder = TempDir::new().expect("folder");
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.gltf");
@@ -222,9 +247,10 @@ fn no_measurement_overwrites_what_it_reads() {
     let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/references/cornell.exr");
     let copy = folder.path().join("r.exr");
     std::fs::copy(reference, &copy).expect("a copy");
+    std::fs::copy(reference, folder.path().join("r.png")).expect("a copy");
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.gltf");
     for arguments in [
-        vec!["compare", reference, "r.exr", "--heatmap", "r.exr"],
+        vec!["compare", reference, "r.png", "--heatmap", "r.png"],
         vec!["converge", "--scene", scene, "--reference", "r.exr", "--csv", "r.exr"],
         vec!["bench", "gather", "--json", "f", "--plot", "f"],
     ] {

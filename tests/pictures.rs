@@ -10,7 +10,7 @@ use ppm_vk::gather;
 use ppm_vk::gpu::Device;
 use ppm_vk::metrics::{Defects, compare, defects};
 
-use picture::{Subject, long, reference, small};
+use picture::{Subject, reference, small};
 
 fn assert_matches_reference(name: &str, direct: Direct, iterations: u32, rel_mse: f64) {
     let config = RenderConfig {
@@ -47,10 +47,8 @@ fn a_short_render_of_cornell_spheres_matches_the_path_traced_reference() {
 }
 
 #[test]
+#[ignore = "takes minutes: scripts/test --long"]
 fn long_renders_match_the_path_traced_references() {
-    if !long() {
-        return;
-    }
     for name in ["cornell-spheres", "cornell"] {
         assert_matches_reference(name, Direct::Light, 256, 0.003);
         assert_matches_reference(name, Direct::Photons, 256, 0.01);

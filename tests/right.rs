@@ -11,6 +11,8 @@ mod convergence;
 mod document;
 #[path = "right/energy.rs"]
 mod energy;
+#[path = "right/estimate.rs"]
+mod estimate;
 #[path = "right/furnace.rs"]
 mod furnace;
 #[path = "right/glass.rs"]

@@ -31,8 +31,3 @@ mod sound;
 mod sums;
 #[path = "stability/uniform.rs"]
 mod uniform;
-
-/// Whether tests of minutes run as well.
-fn long() -> bool {
-    std::env::var_os("PPM_VK_LONG").is_some()
-}

@@ -61,6 +61,7 @@ Random sample_of(Random random, uint number, uint samples) {
     Random result = random;
     result.index = random.index * samples + number;
     result.dimension = SAMPLER == SOBOL ? 0u : number;
+    result.state += number * 0x85ebca6bu; // a stream of its own
     return result;
 }
 

@@ -31,10 +31,14 @@ void main() {
         return;
     }
     vec4 radiance = vec4(0.0); // w: as if the photons' curvature were their flux
+    bool has_surface = false;
+    bool has_photons = false;
     for (uint i = 0u; i < settings.slots_per_pixel; i++) {
         uint slot = pixel_slot * settings.slots_per_pixel + i;
         Statistics mine = statistics[slot];
         DirectSum sum = direct_sums[slot];
+        has_surface = has_surface || coverage[slot].asked > 0u;
+        has_photons = has_photons || (mine.accepted_low | mine.accepted_high) != 0u;
         // The quotient of flux and emitted photons comes first: both grow without bound, it doesn't.
         radiance.rgb += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
         if (mine.radius2_high > 0.0) {
@@ -45,6 +49,9 @@ void main() {
     if (!finite(radiance.rgb) || isnan(radiance.w) || isinf(radiance.w)) {
         atomicAdd(status.non_finite, 1u);
         radiance = vec4(0.0);
+    }
+    if (has_surface && !has_photons) {
+        radiance.w = uintBitsToFloat(0x7f800000u);
     }
     film[pixel.y * settings.resolution.x + pixel.x] = radiance;
 }

@@ -4,10 +4,11 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::slope_text;
 use crate::backend::{Backend, DeviceDescription};
 use crate::config::RenderConfig;
 use crate::error::Result;
-use crate::estimate::ErrorEstimate;
+use crate::estimate::{ErrorEstimate, of_one_photon};
 use crate::film::Image;
 use crate::gpu::Device;
 use crate::metrics::compare;
@@ -31,6 +32,8 @@ pub struct Converge<'a> {
     pub seconds: f64,
     /// Settings and their names.
     pub settings: Vec<(String, RenderConfig)>,
+    /// Asked after every iteration; what has been measured by then counts.
+    pub stop: &'a dyn Fn() -> bool,
 }
 
 /// A setting's errors.
@@ -40,8 +43,9 @@ pub struct Curve {
     pub setting: String,
     /// After 1, 2, 4, … iterations.
     pub points: Vec<Measured>,
-    /// Slope of log relMSE against log device seconds, by least squares, from the fourth iteration on.
-    pub slope: f64,
+    /// Slope of log relMSE against log device seconds, by least squares, from the fourth iteration on; `None` with fewer than
+    /// two points.
+    pub slope: Option<f64>,
 }
 
 /// Error after so many iterations.
@@ -61,7 +65,7 @@ pub struct Measured {
     pub mean_ratio: [f64; 3],
     /// Root of relMSE as the render estimates it by itself.
     pub estimated_error: Option<f64>,
-    /// 1 / (relMSE · device seconds).
+    /// 1 / (relMSE · device seconds); infinite where the picture is the reference.
     pub efficiency: f64,
 }
 
@@ -74,29 +78,46 @@ pub struct Convergence {
     pub curves: Vec<Curve>,
 }
 
-/// Renders with each setting; `note` hears what it is doing.
+/// Renders with each setting; `note` hears what it is doing, `measured` gets all that is known after each measurement.
 ///
 /// # Errors
-/// Whatever a render can meet.
-pub fn converge(what: &Converge, note: &dyn Fn(&str)) -> Result<Convergence> {
-    let mut device = None;
-    let mut curves = Vec::new();
+/// Whatever a render can meet, and `measured`'s own.
+pub fn converge(
+    what: &Converge,
+    note: &dyn Fn(&str),
+    measured: &mut dyn FnMut(&Convergence) -> Result<()>,
+) -> Result<()> {
+    let mut known: Option<Convergence> = None;
     for (name, config) in &what.settings {
+        if (what.stop)() {
+            break;
+        }
         note(name);
         let mut renderer = Renderer::new(Device::open(what.device)?, what.scene, what.camera, config.clone())?;
-        device.get_or_insert(renderer.device());
-        curves.push(curve(what, name, &mut renderer, config)?);
+        let known = known.get_or_insert_with(|| Convergence {
+            device: renderer.device(),
+            curves: Vec::new(),
+        });
+        known.curves.push(Curve {
+            setting: name.clone(),
+            points: Vec::new(),
+            slope: None,
+        });
+        follow(what, &mut renderer, config, known, measured)?;
     }
-    Ok(Convergence {
-        device: device.ok_or_else(|| crate::error::Error::Config("no setting to render with".to_owned()))?,
-        curves,
-    })
+    Ok(())
 }
 
-fn curve(what: &Converge, name: &str, renderer: &mut Renderer, config: &RenderConfig) -> Result<Curve> {
-    let mut estimate = ErrorEstimate::new(config.alpha);
+/// Adds points to the last curve for as long as there is time.
+fn follow(
+    what: &Converge,
+    renderer: &mut Renderer,
+    config: &RenderConfig,
+    known: &mut Convergence,
+    measured: &mut dyn FnMut(&Convergence) -> Result<()>,
+) -> Result<()> {
+    let mut estimate = ErrorEstimate::new(config.alpha, of_one_photon(what.scene, renderer, config));
     let (mut wall_s, mut device_s) = (0.0, 0.0);
-    let mut points = Vec::new();
     let mut next = 1;
     loop {
         let begin = Instant::now();
@@ -104,52 +125,59 @@ fn curve(what: &Converge, name: &str, renderer: &mut Renderer, config: &RenderCo
         wall_s += begin.elapsed().as_secs_f64();
         device_s += run.launches.iter().map(|launch| launch.duration_ns * 1e-9).sum::<f64>();
         let iterations = renderer.iterations();
-        let last = wall_s >= what.seconds;
+        let last = wall_s >= what.seconds || (what.stop)();
         if estimate.wants(iterations) {
             estimate.add(iterations, renderer.resolve_all()?);
         }
         if iterations == next || last {
             let comparison = compare(&renderer.resolve()?, what.reference)?;
-            points.push(Measured {
-                iterations,
-                device_s,
-                wall_s,
-                rel_mse: comparison.rel_mse,
-                rmse: comparison.rmse,
-                mean_ratio: comparison.mean_ratio,
-                estimated_error: estimate.relative(iterations).map(|error| error.total),
-                efficiency: 1.0 / (comparison.rel_mse * device_s),
-            });
+            if let Some(curve) = known.curves.last_mut() {
+                curve.points.push(Measured {
+                    iterations,
+                    device_s,
+                    wall_s,
+                    rel_mse: comparison.rel_mse,
+                    rmse: comparison.rmse,
+                    mean_ratio: comparison.mean_ratio,
+                    estimated_error: estimate.relative(iterations).map(|error| error.total),
+                    efficiency: 1.0 / (comparison.rel_mse * device_s),
+                });
+                let fitted = curve.points.iter().filter(|point| point.iterations >= FIRST_FITTED);
+                curve.slope = super::log_slope(fitted.map(|point| (point.device_s, point.rel_mse)));
+            }
+            measured(known)?;
             next = next.max(iterations) * 2;
         }
         if last {
-            let fitted = points.iter().filter(|point| point.iterations >= FIRST_FITTED);
-            let slope = super::log_slope(fitted.map(|point| (point.device_s, point.rel_mse)));
-            return Ok(Curve {
-                setting: name.to_owned(),
-                points,
-                slope,
-            });
+            return Ok(());
         }
     }
 }
 
-/// Seconds of the device after which a curve reaches this relMSE, between its points on the log-log line.
-pub fn seconds_to(curve: &Curve, rel_mse: f64) -> Option<f64> {
+/// When a curve reaches an error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reached {
+    /// After so many seconds of the device.
+    After(f64),
+    /// With the first measurement: within so many seconds.
+    Within(f64),
+    /// Not as long as it was measured.
+    Never,
+}
+
+/// When a curve reaches this relMSE, between its points on the log-log line.
+pub fn seconds_to(curve: &Curve, rel_mse: f64) -> Reached {
     let mut before: Option<&Measured> = None;
     for point in &curve.points {
         if point.rel_mse <= rel_mse {
-            return Some(match before {
-                None => point.device_s,
-                Some(before) => {
-                    let along = (before.rel_mse / rel_mse).ln() / (before.rel_mse / point.rel_mse).ln();
-                    before.device_s * (point.device_s / before.device_s).powf(along)
-                }
+            return before.map_or(Reached::Within(point.device_s), |before| {
+                let along = (before.rel_mse / rel_mse).ln() / (before.rel_mse / point.rel_mse).ln();
+                Reached::After(before.device_s * (point.device_s / before.device_s).powf(along))
             });
         }
         before = Some(point);
     }
-    None
+    Reached::Never
 }
 
 /// The curves as comma-separated values, with a heading.
@@ -214,22 +242,26 @@ pub fn converge_table(convergence: &Convergence) -> String {
     text.push('\n');
     for curve in &convergence.curves {
         text += &format!(
-            "{}: relMSE falls with time to the power {:.2}",
-            curve.setting, curve.slope
+            "{}: relMSE falls with time to the power {}",
+            curve.setting,
+            slope_text(curve.slope)
         );
         let (first, end) = (&convergence.curves[0], curve.points.last());
         if let Some(end) = end
             && !std::ptr::eq(first, curve)
         {
-            text += &match seconds_to(first, end.rel_mse) {
-                Some(seconds) => format!(
-                    "; its last relMSE, {:.6}, takes {} {seconds:.2} s instead of {:.2} s: a factor of {:.2}",
-                    end.rel_mse,
-                    first.setting,
-                    end.device_s,
-                    end.device_s / seconds
+            let (error, name, taken) = (end.rel_mse, &first.setting, end.device_s);
+            text += &match seconds_to(first, error) {
+                Reached::After(seconds) => format!(
+                    "; its last relMSE, {error:.6}, takes {name} {seconds:.2} s instead of {taken:.2} s: a factor of {:.2}",
+                    taken / seconds
                 ),
-                None => format!("; {} doesn't reach its last relMSE, {:.6}", first.setting, end.rel_mse),
+                Reached::Within(seconds) => format!(
+                    "; its last relMSE, {error:.6}, takes {name} at most {seconds:.2} s, its first measurement, instead of \
+                     {taken:.2} s: a factor of {:.2} or more",
+                    taken / seconds
+                ),
+                Reached::Never => format!("; {name} doesn't reach its last relMSE, {error:.6}"),
             };
         }
         text.push('\n');
@@ -256,11 +288,13 @@ mod tests {
         let curve = Curve {
             setting: "s".to_owned(),
             points: vec![point(1, 1.0, 1.0), point(4, 4.0, 0.25)],
-            slope: -1.0,
+            slope: None,
         };
-        let close = |found: Option<f64>, expected: f64| (found.expect("a time") - expected).abs() < 1e-12;
-        assert!(close(seconds_to(&curve, 0.5), 2.0), "{:?}", seconds_to(&curve, 0.5));
-        assert!(close(seconds_to(&curve, 2.0), 1.0));
-        assert_eq!(seconds_to(&curve, 0.1), None);
+        let Reached::After(seconds) = seconds_to(&curve, 0.5) else {
+            panic!("{:?}", seconds_to(&curve, 0.5));
+        };
+        assert!((seconds - 2.0).abs() < 1e-12, "{seconds}");
+        assert_eq!(seconds_to(&curve, 2.0), Reached::Within(1.0));
+        assert_eq!(seconds_to(&curve, 0.1), Reached::Never);
     }
 }

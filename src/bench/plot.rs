@@ -5,6 +5,7 @@ use plotters::prelude::*;
 use super::converge::Convergence;
 use super::gather::Results;
 use super::scaling::Scaling;
+use super::slope_text;
 use crate::error::{Error, Result};
 
 const COLORS: [RGBColor; 6] = [
@@ -178,7 +179,7 @@ pub fn plot_scaling(scaling: &Scaling) -> Result<String> {
             let lines: Vec<Line> = series
                 .map(|series| {
                     let points = series.points.iter().map(|point| (point.x, point.cost_us * 1e-3));
-                    let name = format!("{}, slope {:.2}", series.method, series.slope);
+                    let name = format!("{}, slope {}", series.method, slope_text(series.slope));
                     (name, points.collect())
                 })
                 .collect();
@@ -203,7 +204,8 @@ pub fn plot_convergence(convergence: &Convergence) -> Result<String> {
     let lines: Vec<Line> = curves
         .map(|curve| {
             let points = curve.points.iter().map(|point| (point.device_s, point.rel_mse));
-            (format!("{}, slope {:.2}", curve.setting, curve.slope), points.collect())
+            let name = format!("{}, slope {}", curve.setting, slope_text(curve.slope));
+            (name, points.collect())
         })
         .collect();
     let caption = format!("relMSE against seconds: {}", convergence.device.name);

@@ -10,7 +10,7 @@ use crate::cpu::{PathKind, Random};
 
 /// Cells along each axis of the table of 2-, 3- and 4-tuples, as powers of two: some ten thousand cells in all.
 const DIGITS: [u32; 3] = [8, 5, 4];
-/// Standard deviations beyond which a χ² fails: one in 10⁻⁹ of those of random numbers does.
+/// Standard deviations beyond which a χ² fails: 2 in 10⁹ of those of random numbers do.
 pub const LIMIT: f64 = 6.0;
 /// Tuples that a task counts.
 const CHUNK: u64 = 1 << 20;

@@ -40,7 +40,7 @@ pub struct Series {
     /// In growing order.
     pub points: Vec<Point>,
     /// Slope of the line through the points, in logarithms, by least squares.
-    pub slope: f64,
+    pub slope: Option<f64>,
 }
 
 /// A measured cost.
@@ -107,7 +107,7 @@ pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> R
                 method: METHODS[method].name,
                 against,
                 points: Vec::new(),
-                slope: f64::NAN,
+                slope: None,
             };
             for (x, config) in configs {
                 note(&format!("{}: {against} {x:.0}", METHODS[method].name));

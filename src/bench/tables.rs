@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::gather::{MethodResult, ResolutionResult, Results};
 use super::paper::{self, CPU_NAIVE, RESOLUTIONS, STEPS, TABLE_3, TABLE_4};
 use super::scaling::Scaling;
+use super::slope_text;
 use crate::gather::METHODS;
 
 /// All tables.
@@ -256,7 +257,7 @@ pub fn scaling_table(scaling: &Scaling) -> String {
         for point in &series.points {
             let _ = writeln!(text, "{:>14.0} {:>12}", point.x, ms(Some(point.cost_us)));
         }
-        let _ = writeln!(text, "slope of the log-log line {:.2}", series.slope);
+        let _ = writeln!(text, "slope of the log-log line {}", slope_text(series.slope));
     }
     text
 }

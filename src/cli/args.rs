@@ -82,7 +82,7 @@ pub struct RenderArguments {
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Tone-mapped picture.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE.png", value_parser = png_file)]
     pub png: Option<PathBuf>,
     /// Exposure of the PNG, in stops.
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
@@ -97,10 +97,10 @@ pub struct RenderArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub iterations: Option<u32>,
     /// Stop after so many seconds.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
     pub time: Option<Duration>,
     /// Stop when the estimated relative error (root of relMSE) is no larger than this, from iteration 16 on.
-    #[arg(long, value_name = "E", value_parser = positive)]
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = positive)]
     pub target_error: Option<f64>,
     /// Photon paths emitted in an iteration.
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
@@ -112,10 +112,10 @@ pub struct RenderArguments {
     #[arg(long, value_enum, default_value_t = Direct::Light)]
     pub direct: Direct,
     /// Eq. 2's α: the part of an iteration's photons that a visible point keeps.
-    #[arg(long, value_name = "A", default_value_t = 2.0 / 3.0, value_parser = alpha)]
+    #[arg(long, value_name = "A", default_value_t = 2.0 / 3.0, allow_negative_numbers = true, value_parser = alpha)]
     pub alpha: f32,
     /// Initial radius in scene units [default: from the photons' density, printed].
-    #[arg(long, value_name = "R", value_parser = positive)]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     pub radius: Option<f64>,
     /// How visible points find their photons (ppm-vk gathers lists the methods) [default: the fastest].
     #[arg(long, value_name = "METHOD", value_parser = gather_method)]
@@ -198,6 +198,15 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
         Ok(time) if !time.is_zero() => Ok(time),
         Ok(_) => Err("must be above 0".to_owned()),
         Err(error) => Err(error.to_string()),
+    }
+}
+
+/// A file name that says what the file will be.
+pub fn png_file(name: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(name);
+    match path.extension() {
+        Some(extension) if extension.eq_ignore_ascii_case("png") => Ok(path),
+        _ => Err("a PNG is written: its name must end in .png".to_owned()),
     }
 }
 

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory};
 
-use super::args::{Arguments, gather_method, positive, resolution};
+use super::args::{Arguments, gather_method, png_file, positive, resolution};
 use super::outputs::check_outputs;
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
@@ -35,7 +35,7 @@ pub struct BenchGather {
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     photons: u32,
     /// Radius in scene units [default: from the photons' density].
-    #[arg(long, value_name = "R", value_parser = positive)]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     radius: Option<f64>,
     /// Methods, separated by commas [default: all; with --scaling those that look at nearby photons alone].
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = gather_method)]
@@ -59,7 +59,7 @@ pub struct BenchGather {
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write a false-colour picture of the k-means clusters, at the last resolution.
-    #[arg(long, value_name = "FILE.png", conflicts_with = "scaling")]
+    #[arg(long, value_name = "FILE.png", value_parser = png_file, conflicts_with = "scaling")]
     clusters: Option<PathBuf>,
     /// Vulkan device, by a part of its name or its index [default: the best].
     #[arg(long, value_name = "NAME|INDEX")]

@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde_json::json;
 
+use super::args::png_file;
 use super::outputs::check_outputs;
 use super::{Outcome, print};
 use crate::film::{Image, read_exr, write_rgb8};
@@ -22,8 +23,9 @@ pub struct Compare {
     /// Print JSON.
     #[arg(long)]
     json: bool,
-    /// Write the relative squared error of each pixel in false colours, from blue (10⁻⁵ and below) to yellow (1 and above).
-    #[arg(long, value_name = "FILE.png")]
+    /// Write the relative squared error of each pixel in false colours, from blue (10⁻⁵ and below) to yellow (1 and above);
+    /// NaN is green.
+    #[arg(long, value_name = "FILE.png", value_parser = png_file)]
     heatmap: Option<PathBuf>,
 }
 
@@ -44,17 +46,6 @@ pub fn run(arguments: &Compare) -> Result<Outcome> {
     if let Some(file) = &arguments.heatmap {
         write_heatmap(&image, &reference, file)?;
     }
-    if arguments.json {
-        let mut value = serde_json::to_value(measures)?;
-        value["flip"] = json!(mean_flip);
-        return print(&(serde_json::to_string_pretty(&value)? + "\n"));
-    }
-    let [r, g, b] = measures.mean_ratio;
-    let text = format!(
-        "RMSE            {:.6}\nrelMSE          {:.6}\nMAE             {:.6}\nHDR-FLIP        {mean_flip:.6}\n\
-         ratio of means  {r:.5} {g:.5} {b:.5}\n",
-        measures.rmse, measures.rel_mse, measures.mae
-    );
     for (file, defects) in bad {
         if defects.nan + defects.infinite + defects.negative > 0 {
             say!(
@@ -66,17 +57,36 @@ pub fn run(arguments: &Compare) -> Result<Outcome> {
             );
         }
     }
-    print(&text)
+    if arguments.json {
+        let mut value = serde_json::to_value(measures)?;
+        value["flip"] = json!(mean_flip);
+        value["defects"] = json!({"image": bad[0].1, "reference": bad[1].1});
+        return print(&(serde_json::to_string_pretty(&value)? + "\n"));
+    }
+    let [r, g, b] = measures.mean_ratio;
+    print(&format!(
+        "RMSE            {:.6}\nrelMSE          {:.6}\nMAE             {:.6}\nHDR-FLIP        {mean_flip:.6}\n\
+         ratio of means  {r:.5} {g:.5} {b:.5}\n",
+        measures.rmse, measures.rel_mse, measures.mae
+    ))
 }
 
 /// Decades of error that the colours span.
 const DECADES: f32 = 5.0;
+/// None of the others.
+const NAN_COLOR: [u8; 3] = [0, 255, 0];
 
 fn write_heatmap(image: &Image, reference: &Image, file: &Path) -> Result<()> {
     let errors = relative_errors(image, reference)?;
     let bytes: Vec<u8> = errors
         .iter()
-        .flat_map(|&error| false_color(1.0 + error.max(1e-20).log10() / DECADES))
+        .flat_map(|&error| {
+            if error.is_nan() {
+                NAN_COLOR
+            } else {
+                false_color(1.0 + error.max(1e-20).log10() / DECADES)
+            }
+        })
         .collect();
     Ok(write_rgb8([image.width(), image.height()], &bytes, file)?)
 }
@@ -91,8 +101,7 @@ fn false_color(value: f32) -> [u8; 3] {
         [252.0, 166.0, 54.0],
         [240.0, 249.0, 120.0],
     ];
-    let value = if value.is_nan() { 1.0 } else { value.clamp(0.0, 1.0) };
-    let along = value * (COLORS.len() - 1) as f32;
+    let along = value.clamp(0.0, 1.0) * (COLORS.len() - 1) as f32;
     let low = (along as usize).min(COLORS.len() - 2);
     let part = along - low as f32;
     std::array::from_fn(|i| (COLORS[low][i] + part * (COLORS[low + 1][i] - COLORS[low][i])).round() as u8)

@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 
 use super::args::seconds;
 use super::outputs::check_outputs;
-use super::{Outcome, print};
-use crate::bench::{Converge, converge, converge_table, csv, plot_convergence};
+use super::{Outcome, interrupt, print};
+use crate::bench::{Converge, Curve, converge, converge_table, csv, plot_convergence};
 use crate::config::{Direct, Estimator, RenderConfig, Sampler};
 use crate::film::{read_exr, write_whole};
 use crate::gather::METHODS;
@@ -25,7 +25,7 @@ pub struct ConvergeArguments {
     #[arg(long, value_name = "FILE")]
     reference: PathBuf,
     /// Seconds of rendering, for each setting.
-    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "30", allow_negative_numbers = true, value_parser = seconds)]
     time: std::time::Duration,
     /// What differs between the curves; without it there is one, of the defaults.
     #[arg(long, value_enum)]
@@ -33,7 +33,7 @@ pub struct ConvergeArguments {
     /// Photon paths emitted in an iteration.
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     photons: u32,
-    /// Seed.
+    /// Seed; not the reference's, if this program made it.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u32,
     /// Write the curves as comma-separated values.
@@ -151,17 +151,34 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
         reference: &reference,
         seconds: arguments.time.as_secs_f64(),
         settings: settings(&base, arguments.vary),
+        stop: &interrupt::asked,
     };
     let note = |what: &str| {
         say!("converge: {what}");
     };
-    let convergence = converge(&what, &note)?;
-    print(&converge_table(&convergence))?;
-    if let Some(file) = &arguments.csv {
-        write_whole(file, csv(&convergence).as_bytes())?;
-    }
-    if let Some(file) = &arguments.plot {
-        write_whole(file, plot_convergence(&convergence)?.as_bytes())?;
-    }
-    Ok(Outcome::Done)
+    interrupt::install()?;
+    let mut table = String::new();
+    converge(&what, &note, &mut |convergence| {
+        table = converge_table(convergence);
+        if let Some(file) = &arguments.csv {
+            write_whole(file, csv(convergence).as_bytes())?;
+        }
+        if let Some(file) = &arguments.plot {
+            write_whole(file, plot_convergence(convergence)?.as_bytes())?;
+        }
+        let is_reference = |curve: &Curve| curve.points.last().is_some_and(|point| point.rel_mse == 0.0);
+        if let Some(curve) = convergence.curves.iter().find(|curve| is_reference(curve)) {
+            say!(
+                "warning: {}: the picture is the reference, bit for bit; was that made with this seed? Use another --seed",
+                curve.setting
+            );
+        }
+        Ok(())
+    })?;
+    print(&table)?;
+    Ok(if interrupt::asked() {
+        Outcome::Interrupted
+    } else {
+        Outcome::Done
+    })
 }

@@ -14,7 +14,7 @@ use super::progress::{Limits, Progress, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
 use crate::config::{RenderConfig, Sampler};
-use crate::estimate::ErrorEstimate;
+use crate::estimate::{ErrorEstimate, of_one_photon};
 use crate::film::{self, Metadata};
 use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
@@ -65,7 +65,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let progress = Progress::new(limits, arguments.quiet);
     let mut profile = Profile::default();
     let profiled = arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some();
-    let mut estimate = ErrorEstimate::new(config.alpha);
+    let mut estimate = ErrorEstimate::new(config.alpha, of_one_photon(&packed, backend.as_ref(), &config));
     let mut error = None;
     while limits.done(backend.iterations(), start.elapsed(), error) < 1.0
         && !(interrupt::asked() && backend.iterations() > 0)
@@ -85,7 +85,8 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let seconds = start.elapsed().as_secs_f64();
     progress.finish();
 
-    let image = backend.resolve()?;
+    let resolved = backend.resolve_all()?;
+    let image = &resolved.image;
     let estimated = estimate.relative(backend.iterations());
     let metadata = Metadata {
         iterations: u64::from(backend.iterations()),
@@ -95,9 +96,14 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         seconds,
         estimated_error: estimated.map(|error| error.total),
     };
-    film::write_exr(&image, estimate.of_pixels().as_ref(), &output, &metadata)?;
+    film::write_exr(
+        image,
+        estimate.of_pixels(backend.iterations()).as_ref(),
+        &output,
+        &metadata,
+    )?;
     if let Some(png) = &arguments.png {
-        film::write_png(&image, png, arguments.exposure)?;
+        film::write_png(image, png, arguments.exposure)?;
     }
     for warning in backend.counters().warnings(backend.emitted(), config.max_depth) {
         say!("warning: {warning}");
@@ -118,6 +124,13 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
             100.0 * error.bias
         )),
     );
+    if resolved.without_photons() > 0 {
+        say!(
+            "{:.2} % of the pixels have had no photon yet: of indirect light there the error says only what one photon would \
+             bring",
+            100.0 * resolved.without_photons() as f64 / image.pixels().len() as f64
+        );
+    }
     let subject = Subject {
         scene: scene.name.clone(),
         resolution: config.resolution,

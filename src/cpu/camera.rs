@@ -12,7 +12,7 @@ use super::intersect::{Ray, nearest_hit};
 use super::light::emits;
 use super::random::{PathKind, Random};
 use super::sampling::encode_direction;
-use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface, surface_at};
+use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface};
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};

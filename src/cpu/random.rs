@@ -76,6 +76,8 @@ impl Random {
         Self {
             index: self.index.wrapping_mul(samples).wrapping_add(number),
             dimension: if self.sampler == Sampler::Sobol { 0 } else { number },
+            // A stream of its own.
+            state: self.state.wrapping_add(number.wrapping_mul(0x85eb_ca6b)),
             ..*self
         }
     }
@@ -155,6 +157,19 @@ mod tests {
             "covariance {}",
             products / n
         );
+    }
+
+    #[test]
+    fn the_samples_of_a_path_differ_with_every_sampler() {
+        for sampler in [Sampler::Sobol, Sampler::Independent, Sampler::Congruential] {
+            let random = Random::with(sampler, PathKind::Coverage, 3, 5, 7);
+            let mut samples: Vec<_> = (0..16)
+                .map(|number| random.sample_of(number, 16).next4().map(f64::to_bits))
+                .collect();
+            samples.sort_unstable();
+            samples.dedup();
+            assert_eq!(samples.len(), 16, "{sampler:?}");
+        }
     }
 
     #[test]

@@ -17,7 +17,7 @@ fn share_of(coverage: &Coverage) -> f64 {
     }
 }
 
-/// The picture, RGB and curvature, row by row from the top left: eq. 4 for each slot of a pixel, and the mean over the
+/// The picture, RGB and curvature (infinite where no photon has come to a surface), row by row from the top left: eq. 4 for each slot of a pixel, and the mean over the
 /// iterations of what was seen directly. `emitted` are the photon paths of all iterations.
 pub fn resolve(
     settings: &Settings,
@@ -35,14 +35,20 @@ pub fn resolve(
             continue;
         };
         let mut radiance = DVec4::ZERO;
+        let (mut has_surface, mut has_photons) = (false, false);
         for slot in pixel_slot * slots_per_pixel..(pixel_slot + 1) * slots_per_pixel {
             let (statistics, direct) = (&statistics[slot], &direct_sums[slot]);
+            has_surface |= coverage[slot].asked > 0;
+            has_photons |= (statistics.accepted_low | statistics.accepted_high) != 0;
             let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
             let tau = from_two_floats(statistics.flux_high, statistics.flux_low);
             radiance += from_two_floats(direct.high, direct.low) / f64::from(iterations);
             if radius2 > 0.0 {
                 radiance += tau / (PI * radius2 * share_of(&coverage[slot]) * emitted as f64);
             }
+        }
+        if has_surface && !has_photons {
+            radiance.w = f64::INFINITY;
         }
         film[y as usize * width + x as usize] = radiance.as_vec4().to_array();
     }

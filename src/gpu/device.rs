@@ -207,7 +207,7 @@ fn choose(
     };
     let position = position.ok_or_else(|| {
         Error::Device(format!(
-            "no device matches --device {}; there are {}",
+            "no device matches --device {}; this machine has {}",
             choice.unwrap_or(""),
             names.join(", ")
         ))

@@ -74,15 +74,28 @@ impl Planes {
     }
 }
 
-/// HDR-FLIP of each pixel of a picture against a reference of its size.
+/// HDR-FLIP of each pixel of a picture against a reference of its size; NaN where either has a NaN, which counts as black
+/// for the pixels around.
 pub fn flip(image: &Image, reference: &Image) -> Vec<f32> {
+    let is_nan = |pixel: &[f32; 3]| pixel.iter().any(|value| value.is_nan());
+    let pairs = image.pixels().iter().zip(reference.pixels());
+    let unknown: Vec<bool> = pairs.map(|(x, r)| is_nan(x) || is_nan(r)).collect();
     let [test, reference] = [image, reference].map(|image| Planes {
         width: image.width(),
         height: image.height(),
         pixels: image
             .pixels()
             .iter()
-            .map(|pixel| pixel.map(|value| f64::from(value).clamp(0.0, BRIGHTEST)))
+            // NaN fails the comparison.
+            .map(|pixel| {
+                pixel.map(|value| {
+                    if value > 0.0 {
+                        f64::from(value).min(BRIGHTEST)
+                    } else {
+                        0.0
+                    }
+                })
+            })
             .collect(),
     });
     let filters = Filters::new();
@@ -93,7 +106,10 @@ pub fn flip(image: &Image, reference: &Image) -> Vec<f32> {
             *worst = worst.max(here);
         }
     }
-    worst.into_iter().map(|value| value as f32).collect()
+    let values = worst.into_iter().zip(unknown);
+    values
+        .map(|(value, unknown)| if unknown { f32::NAN } else { value as f32 })
+        .collect()
 }
 
 /// Coefficients of the ACES approximation (Narkowicz, 2016) as a quotient of quadratic polynomials.
@@ -107,7 +123,8 @@ fn tone_map(pixel: [f64; 3], exposure: f64) -> [f64; 3] {
     })
 }
 
-/// The exposures, in stops, between which the reference's median and its brightest pixel are shown well.
+/// The exposures, in stops, between which the reference's median and its brightest pixel are shown well. Black pixels, which
+/// no exposure shows, are left out where they are the median (the paper doesn't say what to do then).
 fn exposures(reference: &Planes) -> Vec<f64> {
     let [k0, k1, k2, k3, k4, k5] = ACES;
     let c0 = (k1 - k4 * EXPOSURE_TARGET) / (k0 - k3 * EXPOSURE_TARGET);
@@ -119,10 +136,17 @@ fn exposures(reference: &Planes) -> Vec<f64> {
         .map(|pixel| pixel.iter().zip(LUMINANCE).map(|(value, weight)| value * weight).sum())
         .collect();
     luminances.sort_by(f64::total_cmp);
-    // Black has no exposure that shows it.
-    let floor = f64::from(f32::MIN_POSITIVE);
-    let start = (target / luminances[luminances.len() - 1].max(floor)).log2();
-    let stop = (target / luminances[(luminances.len() - 1) / 2].max(floor)).log2();
+    let brightest = luminances[luminances.len() - 1];
+    if brightest <= 0.0 {
+        return vec![0.0];
+    }
+    let mut median = luminances[(luminances.len() - 1) / 2];
+    if median <= 0.0 {
+        let lit = &luminances[luminances.partition_point(|luminance| *luminance <= 0.0)..];
+        median = lit[(lit.len() - 1) / 2];
+    }
+    let start = (target / brightest).log2();
+    let stop = (target / median).log2();
     let count = (stop - start).ceil().max(2.0);
     let step = (stop - start) / (count - 1.0);
     (0..count as u32).map(|i| start + f64::from(i) * step).collect()
@@ -323,6 +347,36 @@ mod tests {
     fn equal_pictures_do_not_differ() {
         let picture = pattern(0.0);
         assert!(flip(&picture, &picture).iter().all(|&value| value < 1e-6));
+    }
+
+    #[test]
+    fn what_is_not_a_number_has_no_flip_and_leaves_the_rest_its_own() {
+        let (mut pixels, picture) = (pattern(0.0).pixels().to_vec(), pattern(0.0));
+        pixels[100][1] = f32::NAN;
+        let values = flip(&Image::new(60, 44, pixels), &picture);
+        assert!(values[100].is_nan());
+        let others = values.iter().filter(|value| value.is_finite());
+        assert_eq!(others.count(), values.len() - 1);
+    }
+
+    #[test]
+    fn a_reference_that_is_mostly_or_all_black_is_seen_at_few_exposures() {
+        let lit = |count: usize| {
+            let pixel = |index: usize| if index < count { [0.5, 2.0, 1.0] } else { [0.0; 3] };
+            Image::new(60, 44, (0..60 * 44).map(pixel).collect())
+        };
+        for count in [0, 1, 500] {
+            let values = flip(&lit(700), &lit(count));
+            let mean = mean(&values);
+            assert!(mean > 0.01 && mean < 1.0, "{count} pixels are lit: {mean}");
+        }
+        let planes = |image: &Image| Planes {
+            width: 60,
+            height: 44,
+            pixels: image.pixels().iter().map(|pixel| pixel.map(f64::from)).collect(),
+        };
+        assert!(exposures(&planes(&lit(500))).len() <= 2);
+        assert_eq!(exposures(&planes(&lit(0))).len(), 1);
     }
 
     #[test]

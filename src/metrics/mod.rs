@@ -26,27 +26,35 @@ pub struct Comparison {
 
 pub use flip::flip;
 
+/// relMSE's denominator, the same for all values, beside the reference's own square.
+fn floor_of(reference: &Image) -> f64 {
+    REL_MSE_FLOOR * (mean(reference).iter().sum::<f64>() / 3.0).powi(2)
+}
+
+/// A value's part in relMSE.
+fn relative_square(x: f64, r: f64, floor: f64) -> f64 {
+    (x - r).powi(2) / (r * r + floor)
+}
+
 /// (x − r)² / (r² + 0.01·m²) of each pixel, the mean over its channels.
 ///
 /// # Errors
 /// As [`compare`].
 pub fn relative_errors(image: &Image, reference: &Image) -> Result<Vec<f32>> {
     compare(image, reference)?;
-    let floor = REL_MSE_FLOOR * (mean(reference).iter().sum::<f64>() / 3.0).powi(2);
+    let floor = floor_of(reference);
     let pixels = image.pixels().iter().zip(reference.pixels());
     Ok(pixels
         .map(|(x, r)| {
-            let terms = x.iter().zip(r).map(|(&x, &r)| {
-                let (x, r) = (f64::from(x), f64::from(r));
-                (x - r).powi(2) / (r * r + floor)
-            });
+            let channels = x.iter().zip(r);
+            let terms = channels.map(|(&x, &r)| relative_square(x.into(), r.into(), floor));
             (terms.sum::<f64>() / 3.0) as f32
         })
         .collect())
 }
 
 /// Pixels with values that no picture should have in any of their channels; a pixel may count in several.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Defects {
     /// Pixels with a NaN.
     pub nan: usize,
@@ -80,7 +88,7 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison> {
         )));
     }
     let (means, reference_means) = (mean(image), mean(reference));
-    let floor = REL_MSE_FLOOR * (reference_means.iter().sum::<f64>() / 3.0).powi(2);
+    let floor = floor_of(reference);
 
     let (mut absolute, mut squared, mut relative) = (0.0, 0.0, 0.0);
     let samples = image.pixels().as_flattened();
@@ -89,7 +97,7 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison> {
         let error = x - r;
         absolute += error.abs();
         squared += error * error;
-        relative += error * error / (r * r + floor);
+        relative += relative_square(x, r, floor);
     }
     let count = samples.len() as f64;
     Ok(Comparison {

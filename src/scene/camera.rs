@@ -176,7 +176,11 @@ impl Scene {
                 .enumerate()
                 .map(|(index, camera)| format!("{index} {}", quote(&camera.name)))
                 .collect();
-            Error::Config(format!("no camera {}: the scene has {}", quote(wanted), list(&cameras)))
+            Error::Config(format!(
+                "no camera {}: the scene has, by number and name, {}",
+                quote(wanted),
+                list(&cameras)
+            ))
         })
     }
 }

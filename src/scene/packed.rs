@@ -24,6 +24,8 @@ pub struct PackedScene {
     pub features: SceneFeatures,
     /// Emissive triangles.
     pub lights: Vec<Light>,
+    /// What they emit together, mean of RGB.
+    pub power: f64,
     /// The paper's grid of each object.
     pub object_grids: Vec<ObjectGrid>,
     /// Cells of all of them.
@@ -40,7 +42,7 @@ impl PackedScene {
     /// Builds the hierarchy and precomputes the triangles.
     ///
     /// # Errors
-    /// A text, if the hierarchy is too deep.
+    /// A text, if there are too many triangles.
     pub fn new(scene: &Scene) -> Result<Self, String> {
         let corners: Vec<[Vec3; 3]> = scene
             .triangles
@@ -64,6 +66,7 @@ impl PackedScene {
         }
         let (object_grids, object_cells) = object_grids(scene);
         Ok(Self {
+            power: scene.emissive_triangles().iter().map(|light| light.power).sum(),
             features: SceneFeatures::of(&shading_triangles, &materials),
             object_grids,
             object_cells,

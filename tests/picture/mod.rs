@@ -14,11 +14,6 @@ pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Whether tests that take minutes are wanted as well.
-pub fn long() -> bool {
-    std::env::var_os("PPM_VK_LONG").is_some()
-}
-
 /// The picture in `tests/references` that another renderer made of the scene of this name.
 pub fn reference(name: &str) -> Image {
     read_exr(&folder().join("tests/references").join(name).with_extension("exr")).expect("reference")

@@ -10,7 +10,7 @@ use ppm_vk::config::{Direct, RenderConfig, Sampler};
 use ppm_vk::film::Image;
 use ppm_vk::metrics::REL_MSE_FLOOR;
 
-use crate::picture::{Subject, long, reference, small};
+use crate::picture::{Subject, reference, small};
 use crate::references::{dim_pixels, error_of_reference};
 
 /// Squares of a picture along each side; their errors are all but independent of each other.
@@ -210,10 +210,8 @@ fn assert_falls_as_theory_says(name: &str, alpha: f32, radius: f64, iterations: 
 /// With α = 2/3 the noise and the smooth part of the squared bias fall alike, as n^(−2/3). The initial radius is a fraction
 /// of the automatic one, so that what edges leave of the bias makes it a little slower only.
 #[test]
+#[ignore = "takes minutes: scripts/test --long"]
 fn the_error_falls_as_theory_says() {
-    if !long() {
-        return;
-    }
     for name in ["cornell", "cornell-spheres"] {
         let (slope, ratios) = assert_falls_as_theory_says(name, 2.0 / 3.0, 0.015, 1024);
         assert!(
@@ -229,10 +227,8 @@ fn the_error_falls_as_theory_says() {
 
 /// With a radius at which there is about as much bias as noise.
 #[test]
+#[ignore = "takes minutes: scripts/test --long"]
 fn noise_and_bias_fall_by_the_powers_that_alpha_gives_them() {
-    if !long() {
-        return;
-    }
     for alpha in [0.5, 2.0 / 3.0, 0.8, 0.95] {
         assert_falls_as_theory_says("cornell", alpha, 0.05, 256);
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, dvec3};
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, RenderConfig};
+use ppm_vk::config::{Direct, RenderConfig, Sampler};
 use ppm_vk::cpu::{self, Batch, Counts, Inputs};
 use ppm_vk::layout::Photon;
 use ppm_vk::pipeline::Renderer;
@@ -41,6 +41,7 @@ fn config(direct: Direct) -> RenderConfig {
         direct,
         radius: Some(0.01),
         max_depth: MAX_DEPTH,
+        sampler: Sampler::Independent,
         ..small(8, PATHS)
     }
 }

@@ -5,7 +5,7 @@ use ppm_vk::config::{Direct, Estimator, RenderConfig};
 use ppm_vk::film::Image;
 
 use crate::measure::{Measured, measure};
-use crate::picture::{Subject, folder, long, reference, small};
+use crate::picture::{Subject, folder, reference, small};
 
 /// Which pixels of a picture of this size are read: those that don't see the lamp, directly or by a mirror, nor are next to
 /// one that does. What a pixel's place in the lamp's picture makes would drown all other noise.
@@ -110,10 +110,8 @@ fn a_short_render_of_cornell_spheres_is_as_bright_as_the_path_traced_reference()
 }
 
 #[test]
+#[ignore = "takes minutes: scripts/test --long"]
 fn every_part_of_long_renders_is_as_bright_as_in_the_references() {
-    if !long() {
-        return;
-    }
     for (name, along) in [("cornell", 4), ("cornell-spheres", 4), ("ring", 4), ("pool", 1)] {
         for direct in [Direct::Light, Direct::Photons] {
             let config = RenderConfig {

@@ -4,10 +4,6 @@ use std::f64::consts::PI;
 use std::fs;
 
 use glam::{DVec3, dvec3};
-use ppm_vk::backend::settings;
-use ppm_vk::config::RenderConfig;
-use ppm_vk::cpu::{self, Counts, Inputs};
-use ppm_vk::layout::NO_OBJECT;
 use tempfile::TempDir;
 
 use crate::document::Document;
@@ -91,57 +87,4 @@ pub fn mean_over_disc(value: impl Fn(DVec3) -> f64, centre: DVec3, radius: f64) 
         }
     }
     sum / f64::from(RINGS * SPOKES)
-}
-
-/// How much of its photons a picture lacks at the most where its radius is the initial one, if all visible points see the
-/// same irradiance: discs around points near the rim of their object reach beyond it. All objects must be rectangles along
-/// the axes; where two rims are near, what both cut off counts twice.
-pub fn lost_at_rims(subject: &Subject, config: &RenderConfig) -> f64 {
-    const ITERATIONS: u32 = 8;
-    let scene = &subject.scene;
-    let bounds: Vec<_> = scene
-        .objects
-        .iter()
-        .map(|object| {
-            let corners = object
-                .triangles
-                .clone()
-                .flat_map(|triangle| scene.triangles[triangle as usize].vertices);
-            let positions = corners.map(|vertex| scene.positions[vertex as usize].as_dvec3());
-            positions.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-                (low.min(p), high.max(p))
-            })
-        })
-        .collect();
-    let settings = settings(config, &subject.packed, &scene.cameras[0], u32::MAX);
-    let inputs = Inputs {
-        scene: &subject.packed,
-        settings: &settings,
-        config,
-    };
-    let radius = f64::from(settings.initial_radius2).sqrt();
-    let mut lost = 0.0;
-    for iteration in 0..ITERATIONS {
-        for point in cpu::camera(&inputs, iteration, &Counts::default()).points {
-            let [x, y, z, object] = point.position_object;
-            if object.to_bits() == NO_OBJECT {
-                continue;
-            }
-            let position = dvec3(x.into(), y.into(), z.into());
-            let (low, high) = bounds[object.to_bits() as usize];
-            for axis in 0..3 {
-                if high[axis] - low[axis] > 1e-4 {
-                    lost += cut_off((position[axis] - low[axis]) / radius);
-                    lost += cut_off((high[axis] - position[axis]) / radius);
-                }
-            }
-        }
-    }
-    lost / f64::from(ITERATIONS * config.resolution[0] * config.resolution[1])
-}
-
-/// Share of a disc beyond a line at so many radii from its centre.
-fn cut_off(distance: f64) -> f64 {
-    let t = distance.clamp(-1.0, 1.0);
-    (t.acos() - t * (1.0 - t * t).sqrt()) / PI
 }

@@ -13,7 +13,6 @@ use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::bench::{Bench, photon, visible_point, xyz};
-use super::long;
 use super::sound::assert_sound;
 
 const SLOTS: u32 = 64;
@@ -139,10 +138,9 @@ fn radius_and_flux_follow_equations_2_and_3_over_twenty_thousand_iterations() {
 }
 
 #[test]
+#[ignore = "takes minutes: scripts/test --long"]
 fn radius_and_flux_follow_equations_2_and_3_over_a_million_iterations() {
-    if long() {
-        assert_iterations_follow_equations_2_and_3(1_000_000);
-    }
+    assert_iterations_follow_equations_2_and_3(1_000_000);
 }
 
 /// Half a million photons at a time, which no gather of a test could find so often, are put where it puts them.
