@@ -1,5 +1,11 @@
 //! The scene loader: what it makes of good files, and that every bad one gives one clear line.
 
+#[path = "scene/accessors.rs"]
+mod accessors;
+#[path = "scene/assets.rs"]
+mod assets;
+#[path = "scene/attributes.rs"]
+mod attributes;
 #[path = "scene/cameras.rs"]
 mod cameras;
 #[path = "scene/damaged.rs"]

@@ -1,23 +1,90 @@
-//! Checked reading of accessors: everything is verified when one is opened, so that reading elements can't fail.
+//! Accessors as vectors of numbers or as indices, in the formats that glTF allows for each use.
 
-use std::fmt::Debug;
-
-use gltf::json::accessor::{ComponentType, Type};
-use gltf::json::validation::Checked;
+use gltf::json::accessor::ComponentType::{F32, I8, I16, U8, U16, U32};
+use gltf::json::accessor::Type;
 use gltf::json::{Accessor, Index};
 
-use super::diagnostic::{Check, damaged, label};
+use super::diagnostic::Check;
 use super::document::Document;
+use super::elements::{Elements, Format, unsigned};
 
-/// Vectors of three floats: positions or normals.
+/// The formats that something may be stored in.
+pub(super) struct Formats {
+    /// By glTF itself (2.0, section 3.7.2.1).
+    core: &'static [Format],
+    /// Besides, in a file that uses `KHR_mesh_quantization`.
+    quantized: &'static [Format],
+}
+
+/// Floats alone.
+const FLOAT: &[Format] = &[Format::plain(F32)];
+/// Floats and fractions of unsigned integers.
+const UNSIGNED_FRACTIONS: &[Format] = &[Format::plain(F32), Format::normalized(U8), Format::normalized(U16)];
+const SIGNED_FRACTIONS: &[Format] = &[Format::normalized(I8), Format::normalized(I16)];
+
+/// What is never anything but floats: keyframe times, translations, scales, matrices.
+pub(super) const FLOATS: Formats = Formats {
+    core: FLOAT,
+    quantized: &[],
+};
+/// POSITION.
+pub(super) const POSITIONS: Formats = Formats {
+    core: FLOAT,
+    quantized: &[
+        Format::plain(I8),
+        Format::normalized(I8),
+        Format::plain(U8),
+        Format::normalized(U8),
+        Format::plain(I16),
+        Format::normalized(I16),
+        Format::plain(U16),
+        Format::normalized(U16),
+    ],
+};
+/// NORMAL and TANGENT, of morph targets as well.
+pub(super) const DIRECTIONS: Formats = Formats {
+    core: FLOAT,
+    quantized: SIGNED_FRACTIONS,
+};
+/// TEXCOORD_n.
+pub(super) const TEXCOORDS: Formats = Formats {
+    core: UNSIGNED_FRACTIONS,
+    quantized: &[
+        Format::plain(I8),
+        Format::normalized(I8),
+        Format::plain(U8),
+        Format::plain(I16),
+        Format::normalized(I16),
+        Format::plain(U16),
+    ],
+};
+/// COLOR_n and WEIGHTS_n.
+pub(super) const FRACTIONS: Formats = Formats {
+    core: UNSIGNED_FRACTIONS,
+    quantized: &[],
+};
+
+/// Vectors of `N` numbers, widened to f64.
 #[derive(Clone, Copy)]
-pub(super) struct Vec3Accessor<'a>(Elements<'a>);
+pub(super) struct Vectors<'a, const N: usize>(Elements<'a>);
 
-impl<'a> Vec3Accessor<'a> {
-    /// Opens an accessor of type VEC3 of FLOAT.
-    pub(super) fn open(document: &'a Document, index: Index<Accessor>) -> Check<Self> {
-        let (elements, _) = Elements::open(document, index, Type::Vec3, &[ComponentType::F32])?;
-        Ok(Self(elements))
+impl<'a, const N: usize> Vectors<'a, N> {
+    /// Opens an accessor of vectors of `N` components.
+    pub(super) fn open(document: &'a Document, index: Index<Accessor>, formats: &Formats) -> Check<Self> {
+        let shape = match N {
+            1 => Type::Scalar,
+            2 => Type::Vec2,
+            3 => Type::Vec3,
+            4 => Type::Vec4,
+            _ => Type::Mat4,
+        };
+        Self::open_any(document, index, &[shape], formats)
+    }
+
+    fn open_any(document: &'a Document, index: Index<Accessor>, shapes: &[Type], formats: &Formats) -> Check<Self> {
+        let quantized = if document.is_quantized { formats.quantized } else { &[] };
+        let formats = [formats.core, quantized].concat();
+        Ok(Self(Elements::open(document, index, shapes, &formats)?))
     }
 
     /// Number of vectors.
@@ -26,159 +93,87 @@ impl<'a> Vec3Accessor<'a> {
     }
 
     /// The vector at `index`, which is less than `len`. It may hold NaN or infinity.
-    pub(super) fn get(&self, index: usize) -> [f32; 3] {
-        let bytes: [u8; 12] = self.0.get(index);
-        let component = |at: usize| f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-        [component(0), component(4), component(8)]
+    pub(super) fn get(&self, index: usize) -> [f64; N] {
+        // An alpha that isn't there is 1; no other use has fewer components than N.
+        let mut vector = [1.0; N];
+        let width = self.0.width.min(N);
+        match self.0.get(index) {
+            None => vector[..width].fill(0.0),
+            Some(bytes) => {
+                let components = bytes.chunks_exact(self.0.format.component.size());
+                for (value, bytes) in vector.iter_mut().zip(components) {
+                    *value = number(bytes, self.0.format);
+                }
+            }
+        }
+        vector
+    }
+
+    /// The same, or `None` if a component isn't finite.
+    pub(super) fn finite(&self, index: usize) -> Option<[f64; N]> {
+        let vector = self.get(index);
+        vector.iter().all(|component| component.is_finite()).then_some(vector)
     }
 }
 
-/// Vertex indices of any of the three widths.
+impl<'a> Vectors<'a, 4> {
+    /// Opens an accessor of RGB or RGBA colours, which become RGBA with an alpha of 1.
+    pub(super) fn open_colors(document: &'a Document, index: Index<Accessor>) -> Check<Self> {
+        Self::open_any(document, index, &[Type::Vec3, Type::Vec4], &FRACTIONS)
+    }
+}
+
+/// A component as a number; fractions as glTF 2.0, section 3.6.2.2, has them.
+fn number(
+    bytes: &[u8],
+    Format {
+        component,
+        is_normalized,
+    }: Format,
+) -> f64 {
+    let bits = unsigned(bytes);
+    let (value, largest) = match component {
+        I8 => (f64::from(bits as u8 as i8), f64::from(i8::MAX)),
+        U8 => (f64::from(bits), f64::from(u8::MAX)),
+        I16 => (f64::from(bits as u16 as i16), f64::from(i16::MAX)),
+        U16 => (f64::from(bits), f64::from(u16::MAX)),
+        U32 => (f64::from(bits), f64::from(u32::MAX)),
+        F32 => return f64::from(f32::from_bits(bits)),
+    };
+    if is_normalized {
+        (value / largest).max(-1.0)
+    } else {
+        value
+    }
+}
+
+/// Unsigned integers: vertex indices or, four at a time, joints.
 #[derive(Clone, Copy)]
-pub(super) struct IndexAccessor<'a> {
-    elements: Elements<'a>,
-    component: ComponentType,
+pub(super) struct Integers<'a, const N: usize>(Elements<'a>);
+
+impl<'a> Integers<'a, 1> {
+    /// Opens an accessor of vertex indices.
+    pub(super) fn open_indices(document: &'a Document, index: Index<Accessor>) -> Check<Self> {
+        let formats = [U8, U16, U32].map(Format::plain);
+        Ok(Self(Elements::open(document, index, &[Type::Scalar], &formats)?))
+    }
 }
 
-impl<'a> IndexAccessor<'a> {
-    /// Opens an accessor of type SCALAR of an unsigned type.
-    pub(super) fn open(document: &'a Document, index: Index<Accessor>) -> Check<Self> {
-        let unsigned = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
-        let (elements, component) = Elements::open(document, index, Type::Scalar, &unsigned)?;
-        Ok(Self { elements, component })
-    }
-
-    /// Number of indices.
+impl<const N: usize> Integers<'_, N> {
+    /// Number of elements.
     pub(super) fn len(&self) -> usize {
-        self.elements.count
+        self.0.count
     }
 
-    /// The vertex index at `index`, which is less than `len`.
-    pub(super) fn get(&self, index: usize) -> u32 {
-        match self.component {
-            ComponentType::U8 => u32::from(u8::from_le_bytes(self.elements.get(index))),
-            ComponentType::U16 => u32::from(u16::from_le_bytes(self.elements.get(index))),
-            _ => u32::from_le_bytes(self.elements.get(index)),
-        }
-    }
-}
-
-/// `count` elements, `stride` bytes apart, all within `bytes`.
-#[derive(Clone, Copy)]
-struct Elements<'a> {
-    bytes: &'a [u8],
-    stride: usize,
-    count: usize,
-}
-
-impl<'a> Elements<'a> {
-    /// Opens the accessor at `index`, which must have the type `shape` and one of the types of `components`.
-    fn open(
-        document: &'a Document,
-        index: Index<Accessor>,
-        shape: Type,
-        components: &[ComponentType],
-    ) -> Check<(Self, ComponentType)> {
-        let index = index.value();
-        let accessors = &document.root.accessors;
-        let accessor = accessors.get(index).ok_or_else(|| {
-            let what = format!("there is no accessor {index}, the file has {}", accessors.len());
-            damaged(what)
-        })?;
-        let fail = |what: String| format!("{}: {what}", label("accessor", index, accessor.name.as_deref()));
-
-        if accessor.sparse.is_some() {
-            let what = "sparse accessors aren't supported yet; export without sparse data";
-            return Err(fail(what.into()));
-        }
-        let component = match (accessor.type_, accessor.component_type) {
-            (Checked::Valid(kind), Checked::Valid(component)) if kind == shape && components.contains(&component.0) => {
-                component.0
+    /// The element at `index`, which is less than `len`.
+    pub(super) fn get(&self, index: usize) -> [u32; N] {
+        let mut element = [0; N];
+        if let Some(bytes) = self.0.get(index) {
+            let components = bytes.chunks_exact(self.0.format.component.size());
+            for (value, bytes) in element.iter_mut().zip(components) {
+                *value = unsigned(bytes);
             }
-            (kind, component) => {
-                let (kind, component) = (spell(kind), spell(component));
-                let what = format!("its elements are {kind} of {component}, not {shape:?} of one of {components:?}");
-                return Err(fail(damaged(what)));
-            }
-        };
-        let Some(view) = accessor.buffer_view else {
-            let what = "it has no bufferView; if an extension compresses its data, export without compression";
-            return Err(fail(what.into()));
-        };
-        let size = shape.multiplicity() * component.size();
-        let elements = Self::locate(document, accessor, view.value(), size).map_err(|what| fail(damaged(what)))?;
-        Ok((elements, component))
-    }
-
-    /// Finds the bytes of an accessor into the view at `view_index`, whose elements have `size` bytes.
-    fn locate(document: &'a Document, accessor: &Accessor, view_index: usize, size: usize) -> Check<Self> {
-        let views = &document.root.buffer_views;
-        let view = views
-            .get(view_index)
-            .ok_or_else(|| format!("there is no bufferView {view_index}, the file has {}", views.len()))?;
-        let buffer_index = view.buffer.value();
-        let buffer = document.buffers.get(buffer_index).ok_or_else(|| {
-            let buffers = document.buffers.len();
-            format!("there is no buffer {buffer_index}, the file has {buffers}")
-        })?;
-
-        let view_start = view.byte_offset.unwrap_or_default().0;
-        let view_bytes = slice(buffer, view_start, view.byte_length.0).ok_or_else(|| {
-            format!(
-                "bufferView {view_index} is {} bytes from byte {view_start} of buffer {buffer_index}, which has {}",
-                view.byte_length.0,
-                buffer.len()
-            )
-        })?;
-
-        // A stride of zero is how some files spell «tightly packed».
-        let stride = match view.byte_stride {
-            Some(stride) if stride.0 != 0 => stride.0,
-            _ => size,
-        };
-        if stride < size {
-            return Err(format!(
-                "bufferView {view_index} has a stride of {stride} bytes for elements of {size}"
-            ));
         }
-        let start = accessor.byte_offset.unwrap_or_default().0;
-        let count = accessor.count.0;
-        let bytes = span(count, stride, size)
-            .and_then(|length| slice(view_bytes, start, length))
-            .ok_or_else(|| {
-                format!(
-                    "its {count} elements from byte {start} don't fit into bufferView {view_index}, which has {} bytes",
-                    view_bytes.len()
-                )
-            })?;
-        // The elements were found to lie in memory, so their number fits as well.
-        let count = usize::try_from(count).map_err(|_| format!("{count} elements are too many"))?;
-        Ok(Self { bytes, stride, count })
+        element
     }
-
-    /// The bytes of an element; `N` is no more than the size that was checked.
-    fn get<const N: usize>(&self, index: usize) -> [u8; N] {
-        let start = index * self.stride;
-        std::array::from_fn(|byte| self.bytes[start + byte])
-    }
-}
-
-fn spell<T: Debug>(value: Checked<T>) -> String {
-    match value {
-        Checked::Valid(value) => format!("{value:?}"),
-        Checked::Invalid => "a kind that glTF doesn't have".into(),
-    }
-}
-
-/// Bytes from the beginning of the first element to the end of the last.
-fn span(count: u64, stride: usize, size: usize) -> Option<u64> {
-    match count.checked_sub(1) {
-        None => Some(0),
-        Some(steps) => steps.checked_mul(stride as u64)?.checked_add(size as u64),
-    }
-}
-
-fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
-    let end = usize::try_from(start.checked_add(length)?).ok()?;
-    bytes.get(usize::try_from(start).ok()?..end)
 }

@@ -1,20 +1,25 @@
 //! Collects triangles in render space.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use gltf::json::Root;
 
+use super::attributes::NotFinite;
 use super::diagnostic::Check;
 use super::facet::{face_normal, spans_area};
-use super::geometry::Instance;
+use super::instance::{Instance, WorldTriangle};
 use super::{Normalisation, Object, Triangle};
 
 /// Mark of a vertex that no triangle has used yet.
 const UNSEEN: u32 = u32::MAX;
 
-/// The triangles of a scene in render space.
+/// The triangles of a scene in render space. Vertices have what the fields of the same names of a
+/// [`Scene`](super::Scene) say.
 pub(super) struct Geometry {
     pub positions: Vec<Vec3>,
     pub normals: Vec<Vec3>,
+    pub texcoords: Vec<[Vec2; 2]>,
+    pub colors: Vec<Vec4>,
+    pub tangents: Vec<Vec4>,
     pub triangles: Vec<Triangle>,
     pub objects: Vec<Object>,
     pub normalisation: Normalisation,
@@ -27,6 +32,8 @@ pub(super) struct Builder {
     pub geometry: Geometry,
     /// Vertices whose normal had no length and was replaced.
     pub zero_normals: usize,
+    /// Texture coordinates, colours and tangents that weren't finite and were left out.
+    pub not_finite: usize,
     /// For each vertex of the primitive in hand, its index in the scene, or [`UNSEEN`]. Kept between primitives, and
     /// cleared only where it was written: many primitives may use small parts of one large accessor.
     scene_vertices: Vec<u32>,
@@ -41,12 +48,16 @@ impl Builder {
             geometry: Geometry {
                 positions: Vec::new(),
                 normals: Vec::new(),
+                texcoords: Vec::new(),
+                colors: Vec::new(),
+                tangents: Vec::new(),
                 triangles: Vec::new(),
                 objects: Vec::new(),
                 normalisation,
                 dropped_triangles: 0,
             },
             zero_normals: 0,
+            not_finite: 0,
             scene_vertices: Vec::new(),
             seen: Vec::new(),
         }
@@ -58,24 +69,20 @@ impl Builder {
         let first = self.geometry.triangles.len();
         let object = self.geometry.objects.len() as u32;
         let mut dropped = 0;
-        if self.scene_vertices.len() < primitive.vertex_count() {
-            self.scene_vertices.resize(primitive.vertex_count(), UNSEEN);
+        if self.scene_vertices.len() < primitive.attributes.len() {
+            self.scene_vertices.resize(primitive.attributes.len(), UNSEEN);
         }
         for triangle in 0..primitive.triangle_count() {
-            let (vertices, corners) = instance.world_triangle(triangle)?;
+            let WorldTriangle { vertices, positions } = instance.triangle(triangle)?;
             let normalisation = self.geometry.normalisation;
-            let positions = corners.map(|corner| normalisation.to_render(corner));
-            let Some(face_normal) = face_normal(corners).filter(|_| spans_area(positions)) else {
+            let rounded = positions.map(|position| normalisation.to_render(position));
+            let Some(face_normal) = face_normal(positions).filter(|_| spans_area(rounded)) else {
                 dropped += 1;
                 continue;
             };
             let mut scene_vertices = [0; 3];
-            for ((scene_vertex, vertex), position) in scene_vertices.iter_mut().zip(vertices).zip(positions) {
-                *scene_vertex = match primitive.normal(vertex)? {
-                    Some(normal) => self.shared_vertex(vertex, position, instance.normal_matrix * normal, face_normal),
-                    // Flat shading: a vertex that two triangles share would have two normals.
-                    None => self.push_vertex(position, face_normal),
-                };
+            for ((scene_vertex, vertex), position) in scene_vertices.iter_mut().zip(vertices).zip(rounded) {
+                *scene_vertex = self.vertex(instance, vertex, position, face_normal)?;
             }
             self.geometry.triangles.push(Triangle {
                 vertices: scene_vertices,
@@ -97,22 +104,79 @@ impl Builder {
         Ok(dropped)
     }
 
-    /// The scene's vertex for a vertex of the primitive in hand. The first triangle that uses it adds it.
-    fn shared_vertex(&mut self, vertex: usize, position: Vec3, normal: DVec3, face_normal: DVec3) -> u32 {
-        if self.scene_vertices[vertex] == UNSEEN {
-            let normal = normal.try_normalize().unwrap_or_else(|| {
-                self.zero_normals += 1;
-                face_normal
-            });
-            self.scene_vertices[vertex] = self.push_vertex(position, normal);
-            self.seen.push(vertex);
-        }
-        self.scene_vertices[vertex]
+    /// Gives the vertices of the last objects the attributes that only earlier ones have.
+    pub(super) fn complete_attributes(&mut self) {
+        let Geometry {
+            positions,
+            texcoords,
+            colors,
+            tangents,
+            ..
+        } = &mut self.geometry;
+        pad(texcoords, positions.len(), NO_TEXCOORDS);
+        pad(colors, positions.len(), NO_COLOR);
+        pad(tangents, positions.len(), NO_TANGENT);
     }
 
-    fn push_vertex(&mut self, position: Vec3, normal: DVec3) -> u32 {
-        self.geometry.positions.push(position);
-        self.geometry.normals.push(normal.as_vec3());
-        (self.geometry.positions.len() - 1) as u32
+    /// The scene's vertex for a vertex of the primitive in hand. The first triangle that uses it adds it.
+    fn vertex(&mut self, instance: &Instance<'_>, vertex: usize, position: Vec3, face_normal: DVec3) -> Check<u32> {
+        let known = self.scene_vertices[vertex];
+        if known != UNSEEN {
+            return Ok(known);
+        }
+        let normal = match instance.normal(vertex)? {
+            // Flat shading: a vertex that two triangles share would have two normals.
+            None => face_normal,
+            Some(normal) => {
+                self.scene_vertices[vertex] = self.geometry.positions.len() as u32;
+                self.seen.push(vertex);
+                normal.try_normalize().unwrap_or_else(|| {
+                    self.zero_normals += 1;
+                    face_normal
+                })
+            }
+        };
+        let attributes = &instance.primitive.attributes;
+        let texcoords = self.or_left_out(attributes.texcoords(vertex), NO_TEXCOORDS);
+        let color = self.or_left_out(attributes.color(vertex), NO_COLOR);
+        let tangent = self.or_left_out(instance.tangent(vertex), NO_TANGENT);
+        let geometry = &mut self.geometry;
+        let index = geometry.positions.len();
+        push(&mut geometry.texcoords, index, texcoords, NO_TEXCOORDS);
+        push(&mut geometry.colors, index, color, NO_COLOR);
+        push(&mut geometry.tangents, index, tangent, NO_TANGENT);
+        geometry.positions.push(position);
+        geometry.normals.push(normal.as_vec3());
+        Ok(index as u32)
+    }
+
+    /// An attribute, or what stands for it where it isn't finite.
+    fn or_left_out<T>(&mut self, attribute: Option<Result<T, NotFinite>>, absent: T) -> Option<T> {
+        attribute.map(|value| {
+            value.unwrap_or_else(|NotFinite| {
+                self.not_finite += 1;
+                absent
+            })
+        })
+    }
+}
+
+/// What vertices have in a scene where others have more.
+const NO_TEXCOORDS: [Vec2; 2] = [Vec2::ZERO; 2];
+const NO_COLOR: Vec4 = Vec4::ONE;
+const NO_TANGENT: Vec4 = Vec4::ZERO;
+
+/// Sets an attribute of the vertex at `index`, which is new. As long as no vertex has it, nothing is stored.
+fn push<T: Copy>(attribute: &mut Vec<T>, index: usize, value: Option<T>, absent: T) {
+    if let Some(value) = value {
+        attribute.resize(index, absent);
+        attribute.push(value);
+    }
+}
+
+/// Fills an attribute that any vertex has up to `count`.
+fn pad<T: Copy>(attribute: &mut Vec<T>, count: usize, absent: T) {
+    if !attribute.is_empty() {
+        attribute.resize(count, absent);
     }
 }

@@ -13,13 +13,15 @@ use super::buffer;
 use super::diagnostic::{Check, damaged, quote};
 use super::glb;
 
-/// The extensions that a file may list as required. Each is a feature of the `gltf` crate that `Cargo.toml` turns on.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 5] = [
+/// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
+/// `Cargo.toml` turns on.
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 6] = [
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_volume",
+    QUANTIZATION,
 ];
 
 /// The largest file that is read, in bytes: what a `.glb` header can express.
@@ -31,7 +33,12 @@ pub(super) struct Document {
     pub root: Root,
     /// One byte string per `root.buffers`, as long as its `byteLength`.
     pub buffers: Vec<Vec<u8>>,
+    /// Whether the file uses [`QUANTIZATION`].
+    pub is_quantized: bool,
 }
+
+/// Allows attributes to be stored as small integers.
+const QUANTIZATION: &str = "KHR_mesh_quantization";
 
 /// What must be known before the rest is parsed: another version or extension may have another structure.
 #[derive(Deserialize)]
@@ -67,7 +74,13 @@ impl Document {
         });
         let folder = path.parent().unwrap_or(Path::new(""));
         let buffers = buffer::read_all(&root, folder, binary)?;
-        Ok(Self { root, buffers })
+        let mut extensions = root.extensions_used.iter().chain(&root.extensions_required);
+        let is_quantized = extensions.any(|extension| extension == QUANTIZATION);
+        Ok(Self {
+            root,
+            buffers,
+            is_quantized,
+        })
     }
 }
 

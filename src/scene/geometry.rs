@@ -2,15 +2,20 @@
 //!
 //! Positions stay f64 from the file to the end: world space may lie far from the origin, where f32 is coarse.
 
-use glam::{DMat3, DVec3};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::rc::Rc;
+
+use glam::DVec3;
 use gltf::json::Root;
 
 use super::Normalisation;
 use super::builder::{Builder, Geometry};
-use super::diagnostic::{Check, Warnings, damaged, list, quote, shorten};
+use super::diagnostic::{Check, Warnings, damaged, list, quote};
 use super::document::Document;
-use super::facet::{face_normal, normal_matrix};
+use super::facet::face_normal;
 use super::graph::{PlacedNode, node_label};
+use super::instance::Instance;
 use super::primitive::{Primitive, primitive_label};
 
 /// The most triangles that a scene may have. A few hundred bytes of instances of instances could ask for any number.
@@ -19,18 +24,6 @@ const MAX_TRIANGLES: usize = 1 << 25;
 /// The most primitives of all nodes together.
 const MAX_OBJECTS: usize = 1 << 20;
 
-/// A primitive as one node shows it.
-pub(super) struct Instance<'a> {
-    node: &'a PlacedNode<'a>,
-    mesh: usize,
-    primitive_index: usize,
-    /// The primitive, in the node's space.
-    pub primitive: Primitive<'a>,
-    /// Takes normals from the node's space to world space, up to their length.
-    pub normal_matrix: DMat3,
-    is_mirrored: bool,
-}
-
 /// Opens the primitives that the nodes show. Nothing of their size is allocated before the total is known.
 pub(super) fn instances<'a>(
     document: &'a Document,
@@ -38,6 +31,7 @@ pub(super) fn instances<'a>(
     warnings: &mut Warnings,
 ) -> Check<Vec<Instance<'a>>> {
     let mut instances = Vec::new();
+    let mut opened: HashMap<(usize, usize), Option<Rc<Primitive<'a>>>> = HashMap::new();
     let mut primitives = 0;
     let mut triangles = 0;
     for placed in nodes {
@@ -53,7 +47,6 @@ pub(super) fn instances<'a>(
                 meshes.len()
             ))
         })?;
-        let (normal_matrix, is_mirrored) = normal_matrix(placed.to_world.matrix3);
         for (primitive_index, primitive) in mesh.primitives.iter().enumerate() {
             primitives += 1;
             if primitives > MAX_OBJECTS {
@@ -61,10 +54,16 @@ pub(super) fn instances<'a>(
                     "its nodes show more than {MAX_OBJECTS} mesh primitives; join meshes or split the scene"
                 ));
             }
-            let label = primitive_label(mesh_index, mesh, primitive_index);
-            let Some(primitive) = Primitive::open(document, mesh, primitive, &label, warnings)
-                .map_err(|what| format!("{label}: {what}"))?
-            else {
+            let opened = match opened.entry((mesh_index, primitive_index)) {
+                Entry::Occupied(entry) => entry.into_mut(),
+                Entry::Vacant(entry) => {
+                    let label = primitive_label(mesh_index, mesh, primitive_index);
+                    let primitive = Primitive::open(document, mesh, primitive, &label, warnings)
+                        .map_err(|what| format!("{label}: {what}"))?;
+                    entry.insert(primitive.map(Rc::new))
+                }
+            };
+            let Some(primitive) = opened else {
                 continue;
             };
             triangles += primitive.triangle_count();
@@ -73,14 +72,7 @@ pub(super) fn instances<'a>(
                     "its nodes show more than {MAX_TRIANGLES} triangles; simplify or split the scene"
                 ));
             }
-            instances.push(Instance {
-                node: placed,
-                mesh: mesh_index,
-                primitive_index,
-                primitive,
-                normal_matrix,
-                is_mirrored,
-            });
+            instances.push(Instance::new(placed, mesh_index, primitive_index, primitive.clone()));
         }
     }
     Ok(instances)
@@ -99,6 +91,7 @@ pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut W
             dropped.push(format!("{} ({count})", quote(&instance.name(root))));
         }
     }
+    builder.complete_attributes();
     let geometry = builder.geometry;
     if !dropped.is_empty() {
         warnings.push(format!(
@@ -113,6 +106,12 @@ pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut W
             builder.zero_normals
         ));
     }
+    if builder.not_finite > 0 {
+        warnings.push(format!(
+            "{} texture coordinates, colours or tangents of vertices aren't finite and are left out",
+            builder.not_finite
+        ));
+    }
     Ok(geometry)
 }
 
@@ -122,11 +121,12 @@ fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
     let mut upper = DVec3::NEG_INFINITY;
     for instance in instances {
         for triangle in 0..instance.primitive.triangle_count() {
-            let (_, corners) = instance
-                .world_triangle(triangle)
-                .map_err(|what| format!("{}: {what}", instance.label(root)))?;
-            if face_normal(corners).is_some() {
-                for corner in corners {
+            let positions = instance
+                .triangle(triangle)
+                .map_err(|what| format!("{}: {what}", instance.label(root)))?
+                .positions;
+            if face_normal(positions).is_some() {
+                for corner in positions {
                     lower = lower.min(corner);
                     upper = upper.max(corner);
                 }
@@ -147,37 +147,4 @@ fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
         return Err("its extent is out of floating-point range; correct the scales of its nodes".into());
     }
     Ok(Normalisation { centre, scale })
-}
-
-impl Instance<'_> {
-    fn label(&self, root: &Root) -> String {
-        primitive_label(self.mesh, &root.meshes[self.mesh], self.primitive_index)
-    }
-
-    /// Name of the node, or of the mesh, or the node's number.
-    pub(super) fn name(&self, root: &Root) -> String {
-        let mesh = &root.meshes[self.mesh];
-        match self.node.node.name.as_deref().or(mesh.name.as_deref()) {
-            Some(name) => shorten(name),
-            None => format!("node {}", self.node.index),
-        }
-    }
-
-    /// Vertices and world positions of a triangle, counter-clockwise from the front.
-    pub(super) fn world_triangle(&self, triangle: usize) -> Check<([usize; 3], [DVec3; 3])> {
-        let mut vertices = self.primitive.triangle(triangle)?;
-        if self.is_mirrored {
-            vertices.swap(1, 2);
-        }
-        let mut corners = [DVec3::ZERO; 3];
-        for (corner, vertex) in corners.iter_mut().zip(vertices) {
-            *corner = self.node.to_world.transform_point3(self.primitive.position(vertex)?);
-            if !corner.is_finite() {
-                return Err(format!(
-                    "the world position of vertex {vertex} is out of floating-point range; correct the node's scale"
-                ));
-            }
-        }
-        Ok((vertices, corners))
-    }
 }

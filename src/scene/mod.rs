@@ -4,6 +4,7 @@
 //! and their longest half axis is 1. Whatever the units and the place of the scene, f32 then has the same precision.
 
 mod accessor;
+mod attributes;
 mod buffer;
 mod builder;
 mod bvh;
@@ -11,11 +12,13 @@ mod camera;
 mod contact;
 mod diagnostic;
 mod document;
+mod elements;
 mod facet;
 mod features;
 mod geometry;
 mod glb;
 mod graph;
+mod instance;
 mod light;
 mod load;
 mod material;
@@ -26,7 +29,7 @@ mod primitive;
 pub use features::SceneFeatures;
 pub use packed::PackedScene;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 pub use light::EmissiveTriangle;
 
@@ -132,7 +135,7 @@ pub struct Object {
 /// A triangle of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Triangle {
-    /// Indices into [`Scene::positions`] and [`Scene::normals`], counter-clockwise seen from the front.
+    /// Indices into [`Scene::positions`] and what else vertices have, counter-clockwise seen from the front.
     pub vertices: [u32; 3],
     /// Index into [`Scene::objects`].
     pub object: u32,
@@ -166,6 +169,15 @@ pub struct Scene {
     pub positions: Vec<Vec3>,
     /// Unit shading normals, one per position.
     pub normals: Vec<Vec3>,
+    /// Texture coordinates of the sets 0 and 1, one pair per position; none at all where no primitive has any. A set
+    /// that a primitive lacks is zero.
+    pub texcoords: Vec<[Vec2; 2]>,
+    /// Linear RGBA factors of the base colour, one per position, white where a primitive has none; none at all where no
+    /// primitive has any.
+    pub colors: Vec<Vec4>,
+    /// Unit tangents, and in w the sign of the bitangent w · normal × tangent, one per position, zero where a primitive
+    /// has none; none at all where no primitive has any.
+    pub tangents: Vec<Vec4>,
     /// Triangles, grouped by object.
     pub triangles: Vec<Triangle>,
     /// Objects.

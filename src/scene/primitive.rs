@@ -1,11 +1,11 @@
 //! A mesh primitive as a list of triangles, whatever its topology and index type.
 
-use glam::DVec3;
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Mesh, mesh};
 
-use super::accessor::{IndexAccessor, Vec3Accessor};
+use super::accessor::Integers;
+use super::attributes::Attributes;
 use super::diagnostic::{Check, Warnings, damaged, label};
 use super::document::Document;
 
@@ -13,10 +13,10 @@ use super::document::Document;
 pub(super) struct Primitive<'a> {
     /// Index of the material, or one past the last for the default material.
     pub material: usize,
+    /// What its vertices have.
+    pub attributes: Attributes<'a>,
     topology: Topology,
-    positions: Vec3Accessor<'a>,
-    normals: Option<Vec3Accessor<'a>>,
-    indices: Option<IndexAccessor<'a>>,
+    indices: Option<Integers<'a, 1>>,
 }
 
 /// How a sequence of vertices forms triangles.
@@ -48,25 +48,13 @@ impl<'a> Primitive<'a> {
             }
             Checked::Invalid => return Err(damaged("its mode is none of 0 to 6")),
         };
-        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
-        let Some(positions) = attribute(Semantic::Positions) else {
+        let Some(attributes) = Attributes::open(document, primitive)? else {
             warnings.push(format!("{label}: it has no POSITION and is skipped"));
             return Ok(None);
         };
-        let positions = Vec3Accessor::open(document, positions).map_err(|what| format!("POSITION, {what}"))?;
-        let normals = attribute(Semantic::Normals)
-            .map(|index| Vec3Accessor::open(document, index))
-            .transpose()
-            .map_err(|what| format!("NORMAL, {what}"))?;
-        if let Some(normals) = normals
-            && normals.len() != positions.len()
-        {
-            let what = format!("{} normals for {} positions", normals.len(), positions.len());
-            return Err(damaged(what));
-        }
         let indices = primitive
             .indices
-            .map(|index| IndexAccessor::open(document, index))
+            .map(|index| Integers::open_indices(document, index))
             .transpose()
             .map_err(|what| format!("indices, {what}"))?;
         let materials = document.root.materials.len();
@@ -83,9 +71,8 @@ impl<'a> Primitive<'a> {
         warn_of_ignored(mesh, primitive, label, warnings);
         let opened = Self {
             material,
+            attributes,
             topology,
-            positions,
-            normals,
             indices,
         };
         let excess = opened.sequence_length() % 3;
@@ -105,11 +92,6 @@ impl<'a> Primitive<'a> {
         }
     }
 
-    /// Number of vertices.
-    pub(super) fn vertex_count(&self) -> usize {
-        self.positions.len()
-    }
-
     /// The vertices of a triangle, checked to exist, counter-clockwise from the front.
     pub(super) fn triangle(&self, triangle: usize) -> Check<[usize; 3]> {
         let corners = match self.topology {
@@ -120,35 +102,19 @@ impl<'a> Primitive<'a> {
         };
         let mut vertices = [0; 3];
         for (vertex, corner) in vertices.iter_mut().zip(corners) {
-            *vertex = self.indices.map_or(corner, |indices| indices.get(corner) as usize);
-            if *vertex >= self.positions.len() {
+            *vertex = self.indices.map_or(corner, |indices| indices.get(corner)[0] as usize);
+            if *vertex >= self.attributes.len() {
                 return Err(damaged(format_args!(
                     "its index {corner} is vertex {vertex}, but it has {} vertices",
-                    self.positions.len()
+                    self.attributes.len()
                 )));
             }
         }
         Ok(vertices)
     }
 
-    /// Position of a vertex in the node's space, checked to be finite.
-    pub(super) fn position(&self, vertex: usize) -> Check<DVec3> {
-        finite(self.positions, vertex)
-            .ok_or_else(|| damaged(format_args!("the position of vertex {vertex} isn't finite")))
-    }
-
-    /// Normal of a vertex in the node's space as the file gives it, checked to be finite; `None` where it gives none.
-    pub(super) fn normal(&self, vertex: usize) -> Check<Option<DVec3>> {
-        self.normals
-            .map(|normals| {
-                finite(normals, vertex)
-                    .ok_or_else(|| damaged(format_args!("the normal of vertex {vertex} isn't finite")))
-            })
-            .transpose()
-    }
-
     fn sequence_length(&self) -> usize {
-        self.indices.map_or(self.positions.len(), |indices| indices.len())
+        self.indices.map_or(self.attributes.len(), |indices| indices.len())
     }
 }
 
@@ -156,14 +122,6 @@ impl<'a> Primitive<'a> {
 pub(super) fn primitive_label(mesh_index: usize, mesh: &Mesh, primitive_index: usize) -> String {
     let mesh = label("mesh", mesh_index, mesh.name.as_deref());
     format!("{mesh}, primitive {primitive_index}")
-}
-
-fn finite(accessor: Vec3Accessor<'_>, index: usize) -> Option<DVec3> {
-    let vector = accessor.get(index);
-    vector
-        .iter()
-        .all(|component| component.is_finite())
-        .then(|| DVec3::from_array(vector.map(f64::from)))
 }
 
 fn warn_of_ignored(mesh: &Mesh, primitive: &mesh::Primitive, label: &str, warnings: &mut Warnings) {

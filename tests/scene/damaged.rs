@@ -123,20 +123,58 @@ fn accessors_of_the_wrong_type_are_named() {
 }
 
 #[test]
-fn accessors_without_plain_data_are_refused() {
-    let sparse = json!({
-        "count": 1,
-        "indices": {"bufferView": 2, "componentType": 5123},
-        "values": {"bufferView": 0}
-    });
-    assert_change_fails(
-        "/accessors/0/sparse",
-        sparse,
-        &["accessor 0", "sparse", "aren't supported yet"],
+fn a_damaged_sparse_part_is_named() {
+    // The six indices 0 1 2 0 2 3 begin with three that increase.
+    let sparse = |count: u64| {
+        json!({
+            "count": count,
+            "indices": {"bufferView": 2, "componentType": 5123},
+            "values": {"bufferView": 0}
+        })
+    };
+    let assert_sparse_fails = |change: fn(&mut Value), parts: &[&str]| {
+        let mut value = sparse(3);
+        change(&mut value);
+        assert_change_fails(
+            "/accessors/0/sparse",
+            value,
+            &[&["accessor 0", "sparse"], parts].concat(),
+        );
+    };
+    assert_sparse_fails(|sparse| sparse["count"] = json!(4), &["index 3 is 0", "increase"]);
+    assert_sparse_fails(
+        |sparse| sparse["count"] = json!(u64::MAX),
+        &["don't fit into bufferView 2"],
+    );
+    assert_sparse_fails(
+        |sparse| sparse["indices"]["bufferView"] = json!(9),
+        &["no bufferView 9"],
+    );
+    assert_sparse_fails(
+        |sparse| sparse["values"]["bufferView"] = json!(2),
+        &["3 elements", "bufferView 2"],
+    );
+    assert_sparse_fails(
+        |sparse| sparse["indices"]["componentType"] = json!(5126),
+        &["indices", "doesn't have"],
     );
     let mut room = Fixture::room();
+    let indices = room.add_indices(&[4]);
+    room.set("/accessors/0/sparse", sparse(1));
+    room.set(
+        "/accessors/0/sparse/indices/bufferView",
+        room.json["accessors"][indices]["bufferView"].clone(),
+    );
+    room.assert_fails(&["index 0 is 4", "less than 4"]);
+}
+
+#[test]
+fn elements_that_no_byte_stands_behind_are_few() {
+    let mut room = Fixture::room();
     room.remove("/accessors/0/bufferView");
-    room.assert_fails(&["accessor 0", "no bufferView"]);
+    room.assert_warns(&["dropped 2 triangles", "\"floor\""]);
+    room.set("/accessors/0/count", json!(1u64 << 40));
+    room.assert_fails(&["accessor 0", "without a bufferView"]);
 }
 
 #[test]

@@ -121,6 +121,25 @@ impl Fixture {
         accessor
     }
 
+    /// Adds an accessor of floats of another type than VEC3, and returns its index.
+    pub fn add_floats(&mut self, kind: &str, width: usize, values: &[f32]) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        self.add_accessor(&bytes, values.len() / width, 5126, kind)
+    }
+
+    /// Replaces elements of an accessor by a sparse part.
+    pub fn add_sparse(&mut self, accessor: usize, indices: &[u16], values: &[[f32; 3]]) -> &mut Self {
+        let view = |fixture: &Self, accessor: usize| fixture.json["accessors"][accessor]["bufferView"].clone();
+        let places = self.add_indices(indices);
+        let replaced = self.add_vectors(values);
+        let sparse = json!({
+            "count": indices.len(),
+            "indices": {"bufferView": view(self, places), "componentType": 5123},
+            "values": {"bufferView": view(self, replaced)}
+        });
+        self.set(&format!("/accessors/{accessor}/sparse"), sparse)
+    }
+
     /// Overwrites a float of an accessor that `add_vectors` made.
     pub fn poke(&mut self, accessor: usize, float: usize, value: f32) -> &mut Self {
         let view = self.json["accessors"][accessor]["bufferView"].as_u64().expect("a view") as usize;
@@ -258,6 +277,25 @@ pub fn assert_error(result: Result<Scene>, parts: &[&str]) {
 pub fn assert_close(found: Vec3, wanted: [f32; 3]) {
     let wanted = Vec3::from(wanted);
     assert!(found.abs_diff_eq(wanted, 2e-6), "{found} instead of {wanted}");
+}
+
+/// The corners of all triangles, in order.
+pub fn soup(scene: &Scene) -> Vec<[Vec3; 3]> {
+    let corners = |vertices: [u32; 3]| vertices.map(|vertex| scene.positions[vertex as usize]);
+    scene
+        .triangles
+        .iter()
+        .map(|triangle| corners(triangle.vertices))
+        .collect()
+}
+
+/// World positions of the corners of all triangles, in order.
+pub fn world_soup(scene: &Scene) -> Vec<[Vec3; 3]> {
+    let world = |position: Vec3| {
+        let render = position.as_dvec3();
+        (render / scene.normalisation.scale + scene.normalisation.centre).as_vec3()
+    };
+    soup(scene).into_iter().map(|corners| corners.map(world)).collect()
 }
 
 /// The normal that the order of a triangle's corners gives.

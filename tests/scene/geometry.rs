@@ -7,17 +7,7 @@ use glam::Vec3;
 use ppm_vk::scene::Scene;
 use serde_json::{Value, json};
 
-use crate::fixture::{Fixture, assert_close, winding_normal};
-
-/// The corners of all triangles, in order.
-fn soup(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let corners = |vertices: [u32; 3]| vertices.map(|vertex| scene.positions[vertex as usize]);
-    scene
-        .triangles
-        .iter()
-        .map(|triangle| corners(triangle.vertices))
-        .collect()
-}
+use crate::fixture::{Fixture, assert_close, soup, winding_normal};
 
 /// Largest difference between the coordinates of the positions, normals and cameras of two scenes.
 fn difference(a: &Scene, b: &Scene) -> f32 {
@@ -132,6 +122,35 @@ fn strips_and_fans_face_the_way_of_their_first_triangle() {
                 assert_close(winding_normal(&scene, triangle), [0.0, 1.0, 0.0]);
             }
         }
+    }
+}
+
+#[test]
+fn strips_and_fans_of_five_vertices_are_three_triangles_each() {
+    let pentagon = [
+        [0.0, 0.0, 1.0],
+        [0.9, 0.1, 0.3],
+        [0.6, 0.2, -0.8],
+        [-0.6, 0.3, -0.8],
+        [-0.9, 0.4, 0.3],
+    ];
+    // glTF 2.0, section 3.7.2.1: p_i = {v_i, v_(i + 1 + i % 2), v_(i + 2 - i % 2)} and p_i = {v_(i + 1), v_(i + 2), v_0}.
+    let lists = [
+        (5, [[0, 1, 2], [1, 3, 2], [2, 3, 4]]),
+        (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0]]),
+    ];
+    for (mode, list) in lists {
+        let mut room = Fixture::room();
+        let positions = room.add_vectors(&pentagon);
+        room.set(
+            "/meshes/0/primitives/0",
+            json!({"attributes": {"POSITION": positions}, "material": 0, "mode": mode}),
+        );
+        let triangles = soup(&room.scene());
+        let indices = room.add_indices(list.as_flattened());
+        room.set("/meshes/0/primitives/0/mode", json!(4));
+        room.set("/meshes/0/primitives/0/indices", json!(indices));
+        assert_eq!(triangles, soup(&room.scene()), "mode {mode}");
     }
 }
 
