@@ -2,6 +2,8 @@
 
 #[path = "scene/accessors.rs"]
 mod accessors;
+#[path = "scene/animation.rs"]
+mod animation;
 #[path = "scene/assets.rs"]
 mod assets;
 #[path = "scene/attributes.rs"]
@@ -10,6 +12,8 @@ mod attributes;
 mod cameras;
 #[path = "scene/damaged.rs"]
 mod damaged;
+#[path = "scene/deformation.rs"]
+mod deformation;
 #[path = "scene/files.rs"]
 mod files;
 #[path = "scene/fixture.rs"]
@@ -24,3 +28,5 @@ mod lights;
 mod materials;
 #[path = "scene/mutation.rs"]
 mod mutation;
+#[path = "scene/tangents.rs"]
+mod tangents;

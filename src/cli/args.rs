@@ -93,6 +93,9 @@ pub struct RenderArguments {
     /// Camera, by name or index [default: the scene's first].
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
+    /// Apply the scene's animations at this time, in seconds [default: everything at rest].
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = frame_time)]
+    pub frame_time: Option<f64>,
     /// Stop after so many iterations [default: 64 if there is neither --time nor --target-error].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub iterations: Option<u32>,
@@ -207,6 +210,15 @@ pub fn png_file(name: &str) -> Result<PathBuf, String> {
     match path.extension() {
         Some(extension) if extension.eq_ignore_ascii_case("png") => Ok(path),
         _ => Err("a PNG is written: its name must end in .png".to_owned()),
+    }
+}
+
+fn frame_time(text: &str) -> Result<f64, String> {
+    let time = number(text)?;
+    if time.is_finite() {
+        Ok(time)
+    } else {
+        Err("must be finite".to_owned())
     }
 }
 

@@ -20,7 +20,7 @@ use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
 use crate::report::{Profile, Subject};
-use crate::scene::{Camera, PackedScene, Scene};
+use crate::scene::{Camera, LoadOptions, PackedScene, Scene};
 
 /// Width of a picture without --resolution.
 const DEFAULT_WIDTH: u32 = 1280;
@@ -38,7 +38,10 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     check_outputs(&[path], outputs(arguments, &output))?;
     interrupt::install()?;
 
-    let scene = Scene::load(path)?;
+    let options = LoadOptions {
+        frame_time: arguments.frame_time,
+    };
+    let scene = Scene::load_with(path, options)?;
     for warning in &scene.warnings {
         say!("warning: {warning}");
     }

@@ -64,6 +64,18 @@ pub(super) const FRACTIONS: Formats = Formats {
     quantized: &[],
 };
 
+/// What animations give rotations and weights as.
+pub(super) const ANIMATED_FRACTIONS: Formats = Formats {
+    core: &[
+        Format::plain(F32),
+        Format::normalized(I8),
+        Format::normalized(U8),
+        Format::normalized(I16),
+        Format::normalized(U16),
+    ],
+    quantized: &[],
+};
+
 /// Vectors of `N` numbers, widened to f64.
 #[derive(Clone, Copy)]
 pub(super) struct Vectors<'a, const N: usize>(Elements<'a>);
@@ -156,6 +168,14 @@ impl<'a> Integers<'a, 1> {
     pub(super) fn open_indices(document: &'a Document, index: Index<Accessor>) -> Check<Self> {
         let formats = [U8, U16, U32].map(Format::plain);
         Ok(Self(Elements::open(document, index, &[Type::Scalar], &formats)?))
+    }
+}
+
+impl<'a> Integers<'a, 4> {
+    /// Opens an accessor of joints.
+    pub(super) fn open_joints(document: &'a Document, index: Index<Accessor>) -> Check<Self> {
+        let formats = [U8, U16].map(Format::plain);
+        Ok(Self(Elements::open(document, index, &[Type::Vec4], &formats)?))
     }
 }
 

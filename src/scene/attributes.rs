@@ -5,9 +5,10 @@ use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
 
-use super::accessor::{DIRECTIONS, POSITIONS, TEXCOORDS, Vectors};
+use super::accessor::{DIRECTIONS, FRACTIONS, Integers, POSITIONS, TEXCOORDS, Vectors};
 use super::diagnostic::{Check, damaged};
 use super::document::Document;
+use super::morph::MorphTarget;
 
 /// The attributes of a primitive's vertices, as many of each as there are positions.
 pub(super) struct Attributes<'a> {
@@ -16,6 +17,9 @@ pub(super) struct Attributes<'a> {
     tangents: Option<Vectors<'a, 4>>,
     texcoords: [Option<Vectors<'a, 2>>; 2],
     colors: Option<Vectors<'a, 4>>,
+    /// Joints and their weights, four to a set.
+    influences: Vec<(Integers<'a, 4>, Vectors<'a, 4>)>,
+    morph_targets: Vec<MorphTarget<'a>>,
 }
 
 /// Something that isn't finite.
@@ -55,6 +59,8 @@ impl<'a> Attributes<'a> {
             tangents,
             texcoords,
             colors,
+            influences: influences(document, primitive, count)?,
+            morph_targets: MorphTarget::open_all(document, primitive, count)?,
         }))
     }
 
@@ -63,32 +69,66 @@ impl<'a> Attributes<'a> {
         self.positions.len()
     }
 
-    /// Whether the file gives normals.
-    pub(super) fn has_normals(&self) -> bool {
-        self.normals.is_some()
+    /// Whether the vertices follow joints.
+    pub(super) fn is_skinned(&self) -> bool {
+        !self.influences.is_empty()
     }
 
-    /// Position of a vertex in the node's space, checked to be finite.
-    pub(super) fn position(&self, vertex: usize) -> Check<DVec3> {
-        let position = self.positions.finite(vertex);
-        let position = position.ok_or_else(|| damaged(format_args!("the position of vertex {vertex} isn't finite")))?;
-        Ok(position.into())
+    /// Number of sets of four joints that each vertex follows.
+    pub(super) fn influence_sets(&self) -> usize {
+        self.influences.len()
     }
 
-    /// Normal of a vertex in the node's space as the file gives it, checked to be finite; `None` where it gives none.
-    pub(super) fn normal(&self, vertex: usize) -> Check<Option<DVec3>> {
+    /// Joints that a vertex follows, with their weights.
+    pub(super) fn influences(&self, vertex: usize) -> impl Iterator<Item = (u32, f64)> {
+        let sets = self.influences.iter();
+        sets.flat_map(move |(joints, weights)| joints.get(vertex).into_iter().zip(weights.get(vertex)))
+    }
+
+    /// Number of morph targets.
+    pub(super) fn morph_target_count(&self) -> usize {
+        self.morph_targets.len()
+    }
+
+    /// Position of a vertex in the mesh's space, morphed by targets with weights, checked to be finite.
+    pub(super) fn position(&self, vertex: usize, morph: &[(usize, f64)]) -> Check<DVec3> {
+        let shift = self.shift(vertex, morph, |target| target.positions);
+        let position = DVec3::from(self.positions.get(vertex)) + shift;
+        if position.is_finite() {
+            return Ok(position);
+        }
+        Err(damaged(format_args!("the position of vertex {vertex} isn't finite")))
+    }
+
+    /// Normal of a vertex in the mesh's space as the file gives it, morphed and checked to be finite; `None` where it
+    /// gives none.
+    pub(super) fn normal(&self, vertex: usize, morph: &[(usize, f64)]) -> Check<Option<DVec3>> {
         let Some(normals) = self.normals else {
             return Ok(None);
         };
-        let normal = normals.finite(vertex);
-        let normal = normal.ok_or_else(|| damaged(format_args!("the normal of vertex {vertex} isn't finite")))?;
-        Ok(Some(normal.into()))
+        let shift = self.shift(vertex, morph, |target| target.normals);
+        let normal = DVec3::from(normals.get(vertex)) + shift;
+        if normal.is_finite() {
+            return Ok(Some(normal));
+        }
+        Err(damaged(format_args!("the normal of vertex {vertex} isn't finite")))
     }
 
-    /// Tangent of a vertex in the node's space as the file gives it; `None` where it gives none.
-    pub(super) fn tangent(&self, vertex: usize) -> Option<Result<DVec4, NotFinite>> {
-        let tangents = self.tangents?;
-        Some(tangents.finite(vertex).map(DVec4::from).ok_or(NotFinite))
+    /// Whether the file gives tangents.
+    pub(super) fn has_tangents(&self) -> bool {
+        self.tangents.is_some()
+    }
+
+    /// Tangent of a vertex in the mesh's space as the file gives it, morphed; `None` where it gives none.
+    pub(super) fn tangent(&self, vertex: usize, morph: &[(usize, f64)]) -> Option<Result<DVec4, NotFinite>> {
+        let tangent = DVec4::from(self.tangents?.get(vertex));
+        let shift = self.shift(vertex, morph, |target| target.tangents);
+        let tangent = tangent + shift.extend(0.0);
+        Some(if tangent.is_finite() {
+            Ok(tangent)
+        } else {
+            Err(NotFinite)
+        })
     }
 
     /// Texture coordinates of a vertex, those of a missing set zero; `None` where the file gives none.
@@ -113,10 +153,49 @@ impl<'a> Attributes<'a> {
         let color = self.colors?.finite(vertex).ok_or(NotFinite);
         Some(color.map(|color| Vec4::from(color.map(|value| value as f32)).max(Vec4::ZERO)))
     }
+
+    /// Sum of what morph targets add to an attribute of a vertex, by their weights.
+    fn shift(
+        &self,
+        vertex: usize,
+        morph: &[(usize, f64)],
+        attribute: impl Fn(&MorphTarget<'a>) -> Option<Vectors<'a, 3>>,
+    ) -> DVec3 {
+        let shifts = morph.iter().filter_map(|&(target, weight)| {
+            let shift = attribute(&self.morph_targets[target])?;
+            Some(weight * DVec3::from(shift.get(vertex)))
+        });
+        shifts.sum()
+    }
+}
+
+/// Opens the joints and weights of a primitive, set by set.
+fn influences<'a>(
+    document: &'a Document,
+    primitive: &Primitive,
+    count: usize,
+) -> Check<Vec<(Integers<'a, 4>, Vectors<'a, 4>)>> {
+    let find = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
+    let mut sets = Vec::new();
+    for set in 0.. {
+        let (Some(joints), Some(weights)) = (find(Semantic::Joints(set)), find(Semantic::Weights(set))) else {
+            break;
+        };
+        let joints = Integers::open_joints(document, joints).map_err(|what| format!("JOINTS_{set}, {what}"))?;
+        let weights = Vectors::open(document, weights, &FRACTIONS).map_err(|what| format!("WEIGHTS_{set}, {what}"))?;
+        if joints.len() != count || weights.len() != count {
+            let (joints, weights) = (joints.len(), weights.len());
+            return Err(damaged(format_args!(
+                "{joints} joints and {weights} weights for {count} positions"
+            )));
+        }
+        sets.push((joints, weights));
+    }
+    Ok(sets)
 }
 
 /// Opens an attribute that a primitive may have, checked to be there `count` times.
-fn optional<'a, const N: usize>(
+pub(super) fn optional<'a, const N: usize>(
     name: &str,
     plural: &str,
     count: usize,

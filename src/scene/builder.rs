@@ -6,7 +6,7 @@ use gltf::json::Root;
 use super::attributes::NotFinite;
 use super::diagnostic::Check;
 use super::facet::{face_normal, spans_area};
-use super::instance::{Instance, WorldTriangle};
+use super::instance::{Corner, Instance, WorldTriangle};
 use super::{Normalisation, Object, Triangle};
 
 /// Mark of a vertex that no triangle has used yet.
@@ -73,7 +73,7 @@ impl Builder {
             self.scene_vertices.resize(primitive.attributes.len(), UNSEEN);
         }
         for triangle in 0..primitive.triangle_count() {
-            let WorldTriangle { vertices, positions } = instance.triangle(triangle)?;
+            let WorldTriangle { corners, positions } = instance.triangle(triangle)?;
             let normalisation = self.geometry.normalisation;
             let rounded = positions.map(|position| normalisation.to_render(position));
             let Some(face_normal) = face_normal(positions).filter(|_| spans_area(rounded)) else {
@@ -81,8 +81,8 @@ impl Builder {
                 continue;
             };
             let mut scene_vertices = [0; 3];
-            for ((scene_vertex, vertex), position) in scene_vertices.iter_mut().zip(vertices).zip(rounded) {
-                *scene_vertex = self.vertex(instance, vertex, position, face_normal)?;
+            for ((scene_vertex, corner), position) in scene_vertices.iter_mut().zip(corners).zip(rounded) {
+                *scene_vertex = self.vertex(instance, corner, position, face_normal)?;
             }
             self.geometry.triangles.push(Triangle {
                 vertices: scene_vertices,
@@ -119,9 +119,15 @@ impl Builder {
     }
 
     /// The scene's vertex for a vertex of the primitive in hand. The first triangle that uses it adds it.
-    fn vertex(&mut self, instance: &Instance<'_>, vertex: usize, position: Vec3, face_normal: DVec3) -> Check<u32> {
+    fn vertex(&mut self, instance: &Instance<'_>, corner: Corner, position: Vec3, face_normal: DVec3) -> Check<u32> {
+        let vertex = corner.vertex;
         let known = self.scene_vertices[vertex];
-        if known != UNSEEN {
+        if known != UNSEEN && !instance.primitive.splits_vertices() {
+            return Ok(known);
+        }
+        let tangent = self.or_left_out(instance.tangent(corner)?, NO_TANGENT);
+        // A seam of the texture gives a vertex several tangents.
+        if known != UNSEEN && tangent == self.geometry.tangents.get(known as usize).copied() {
             return Ok(known);
         }
         let normal = match instance.normal(vertex)? {
@@ -139,7 +145,6 @@ impl Builder {
         let attributes = &instance.primitive.attributes;
         let texcoords = self.or_left_out(attributes.texcoords(vertex), NO_TEXCOORDS);
         let color = self.or_left_out(attributes.color(vertex), NO_COLOR);
-        let tangent = self.or_left_out(instance.tangent(vertex), NO_TANGENT);
         let geometry = &mut self.geometry;
         let index = geometry.positions.len();
         push(&mut geometry.texcoords, index, texcoords, NO_TEXCOORDS);

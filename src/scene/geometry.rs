@@ -10,13 +10,16 @@ use glam::DVec3;
 use gltf::json::Root;
 
 use super::Normalisation;
+use super::animation::Pose;
 use super::builder::{Builder, Geometry};
 use super::diagnostic::{Check, Warnings, damaged, list, quote};
 use super::document::Document;
 use super::facet::face_normal;
 use super::graph::{PlacedNode, node_label};
 use super::instance::Instance;
+use super::morph;
 use super::primitive::{Primitive, primitive_label};
+use super::skin::Skins;
 
 /// The most triangles that a scene may have. A few hundred bytes of instances of instances could ask for any number.
 const MAX_TRIANGLES: usize = 1 << 25;
@@ -24,14 +27,20 @@ const MAX_TRIANGLES: usize = 1 << 25;
 /// The most primitives of all nodes together.
 const MAX_OBJECTS: usize = 1 << 20;
 
+/// The most morph targets and sets of joints of all triangles together.
+const MAX_DEFORMATIONS: usize = 1 << 28;
+
 /// Opens the primitives that the nodes show. Nothing of their size is allocated before the total is known.
 pub(super) fn instances<'a>(
     document: &'a Document,
     nodes: &'a [PlacedNode<'a>],
+    pose: &Pose<'_>,
     warnings: &mut Warnings,
 ) -> Check<Vec<Instance<'a>>> {
     let mut instances = Vec::new();
     let mut opened: HashMap<(usize, usize), Option<Rc<Primitive<'a>>>> = HashMap::new();
+    let mut skins = Skins::new(document, nodes);
+    let mut deformations = 0usize;
     let mut primitives = 0;
     let mut triangles = 0;
     for placed in nodes {
@@ -58,7 +67,7 @@ pub(super) fn instances<'a>(
                 Entry::Occupied(entry) => entry.into_mut(),
                 Entry::Vacant(entry) => {
                     let label = primitive_label(mesh_index, mesh, primitive_index);
-                    let primitive = Primitive::open(document, mesh, primitive, &label, warnings)
+                    let primitive = Primitive::open(document, primitive, &label, warnings)
                         .map_err(|what| format!("{label}: {what}"))?;
                     entry.insert(primitive.map(Rc::new))
                 }
@@ -72,7 +81,28 @@ pub(super) fn instances<'a>(
                     "its nodes show more than {MAX_TRIANGLES} triangles; simplify or split the scene"
                 ));
             }
-            instances.push(Instance::new(placed, mesh_index, primitive_index, primitive.clone()));
+            let attributes = &primitive.attributes;
+            let at_node = |what| format!("{}: {what}", node_label(&document.root, placed.index));
+            let targets = attributes.morph_target_count();
+            let morph = morph::weights(placed, pose, mesh.weights.as_deref(), targets).map_err(at_node)?;
+            let skin = placed.node.skin.map(|skin| skins.matrices(skin.value()));
+            let skin = skin.transpose().map_err(at_node)?;
+            let shifts = morph.len() + attributes.influence_sets();
+            deformations = deformations.saturating_add(shifts.saturating_mul(primitive.triangle_count()));
+            if deformations > MAX_DEFORMATIONS {
+                return Err(format!(
+                    "its morph targets and skins move triangles more than {MAX_DEFORMATIONS} times; \
+                     apply them before exporting, or split the scene"
+                ));
+            }
+            instances.push(Instance::new(
+                placed,
+                mesh_index,
+                primitive_index,
+                primitive.clone(),
+                morph,
+                skin,
+            ));
         }
     }
     Ok(instances)

@@ -3,10 +3,11 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use gltf::json::{Node, Root};
 
+use super::animation::{NodePose, Pose};
 use super::diagnostic::{Check, damaged, label};
 
 /// How far the last row of a node's matrix may be from 0 0 0 1.
-const AFFINE_TOLERANCE: f32 = 1e-5;
+const AFFINE_TOLERANCE: f64 = 1e-5;
 
 /// A node of the scene with its place in the world.
 pub(super) struct PlacedNode<'a> {
@@ -23,7 +24,7 @@ pub(super) struct PlacedNode<'a> {
 /// Every node of the default scene, parents before children, in the file's order of depth first.
 ///
 /// Without a default scene the first one is taken, and without any scene all nodes that have no parent.
-pub(super) fn place_nodes(root: &Root) -> Check<Vec<PlacedNode<'_>>> {
+pub(super) fn place_nodes<'a>(root: &'a Root, pose: &Pose<'_>) -> Check<Vec<PlacedNode<'a>>> {
     let has_parent = check_forest(root)?;
     // The last of the stack is next: siblings are pushed in reverse. Recursion would overflow on a long chain.
     let mut stack: Vec<(usize, DAffine3)> = scene_roots(root, &has_parent)?
@@ -34,7 +35,8 @@ pub(super) fn place_nodes(root: &Root) -> Check<Vec<PlacedNode<'_>>> {
     let mut placed = Vec::new();
     while let Some((index, parent_to_world)) = stack.pop() {
         let node = &root.nodes[index];
-        let local = LocalTransform::of(node).map_err(|what| format!("{}: {what}", node_label(root, index)))?;
+        let local = LocalTransform::of(node, pose.node(index))
+            .map_err(|what| format!("{}: {what}", node_label(root, index)))?;
         let to_world = parent_to_world * local.full;
         if !to_world.is_finite() {
             return Err(format!(
@@ -137,9 +139,10 @@ struct LocalTransform {
 }
 
 impl LocalTransform {
-    fn of(node: &Node) -> Check<Self> {
+    /// As the file has it, but for what an animation sets.
+    fn of(node: &Node, pose: Option<&NodePose<'_>>) -> Check<Self> {
         if let Some(matrix) = &node.matrix {
-            let full = affine_from(matrix)?;
+            let full = affine_from(matrix.map(f64::from))?;
             return Ok(Self { full, unscaled: full });
         }
         let translation = DVec3::from_array(widen("translation", node.translation.unwrap_or_default())?);
@@ -148,7 +151,9 @@ impl LocalTransform {
         if rotation.length_squared() == 0.0 {
             return Err(damaged("its rotation is the quaternion 0 0 0 0"));
         }
-        let rotation = rotation.normalize();
+        let translation = pose.and_then(|pose| pose.translation).unwrap_or(translation);
+        let scale = pose.and_then(|pose| pose.scale).unwrap_or(scale);
+        let rotation = pose.and_then(|pose| pose.rotation).unwrap_or(rotation.normalize());
         Ok(Self {
             full: DAffine3::from_scale_rotation_translation(scale, rotation, translation),
             unscaled: DAffine3::from_rotation_translation(rotation, translation),
@@ -157,9 +162,11 @@ impl LocalTransform {
 }
 
 /// The affine map of a column-major 4×4 matrix.
-fn affine_from(matrix: &[f32; 16]) -> Check<DAffine3> {
-    let m = widen("matrix", *matrix)?;
-    let last_row = [matrix[3], matrix[7], matrix[11], matrix[15] - 1.0];
+pub(super) fn affine_from(m: [f64; 16]) -> Check<DAffine3> {
+    if m.iter().any(|entry| !entry.is_finite()) {
+        return Err(damaged("its matrix isn't finite"));
+    }
+    let last_row = [m[3], m[7], m[11], m[15] - 1.0];
     if last_row.iter().any(|entry| entry.abs() > AFFINE_TOLERANCE) {
         return Err(damaged("its matrix isn't affine: the last row must be 0 0 0 1"));
     }

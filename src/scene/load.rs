@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::animation::Pose;
 use super::diagnostic::{Check, Warnings, quote};
 use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::graph::{PlacedNode, place_nodes};
@@ -10,6 +11,14 @@ use crate::error::{Error, Result};
 
 /// Not supported yet, but named in a warning of its own.
 const LIGHTS_EXTENSION: &str = "KHR_lights_punctual";
+
+/// What a scene is loaded with.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LoadOptions {
+    /// The time that the file's animations are applied at, in seconds. `None`: nodes and morph targets are as the file
+    /// has them at rest.
+    pub frame_time: Option<f64>,
+}
 
 impl Scene {
     /// Reads a glTF 2.0 file, `.gltf` or `.glb`, with the buffers that it refers to.
@@ -21,18 +30,31 @@ impl Scene {
     /// [`Error::Scene`], one line, if the file or one of its buffers can't be read or is damaged, if it requires an
     /// extension that isn't supported, or if it shows no triangle or no light.
     pub fn load(path: &Path) -> Result<Self> {
-        load(path).map_err(|what| Error::scene(path, what))
+        Self::load_with(path, LoadOptions::default())
+    }
+
+    /// The same with options.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::load`].
+    pub fn load_with(path: &Path, options: LoadOptions) -> Result<Self> {
+        load(path, options).map_err(|what| Error::scene(path, what))
     }
 }
 
-fn load(path: &Path) -> Check<Scene> {
+fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     let document = Document::read(path)?;
     let root = &document.root;
-    let nodes = place_nodes(root)?;
     let mut warnings = Warnings::default();
-    warn_of_ignored(&document, &nodes, &mut warnings);
+    let pose = match options.frame_time {
+        Some(time) => Pose::at(&document, time, &mut warnings)?,
+        None => Pose::default(),
+    };
+    let nodes = place_nodes(root, &pose)?;
+    warn_of_ignored(&document, &nodes, options, &mut warnings);
 
-    let instances = geometry::instances(&document, &nodes, &mut warnings)?;
+    let instances = geometry::instances(&document, &nodes, &pose, &mut warnings)?;
     let geometry = geometry::assemble(root, &instances, &mut warnings)?;
 
     let mut used = vec![false; root.materials.len() + 1];
@@ -81,7 +103,7 @@ fn load(path: &Path) -> Check<Scene> {
 }
 
 /// Warns of what applies to the file as a whole.
-fn warn_of_ignored(document: &Document, nodes: &[PlacedNode<'_>], warnings: &mut Warnings) {
+fn warn_of_ignored(document: &Document, nodes: &[PlacedNode<'_>], options: LoadOptions, warnings: &mut Warnings) {
     let root = &document.root;
     let has_light = |placed: &&PlacedNode<'_>| {
         let extensions = placed.node.extensions.as_ref();
@@ -101,10 +123,9 @@ fn warn_of_ignored(document: &Document, nodes: &[PlacedNode<'_>], warnings: &mut
             ));
         }
     }
-    if !root.animations.is_empty() {
-        warnings.push("animations aren't supported; the nodes are rendered where they stand in the file".into());
-    }
-    if nodes.iter().any(|placed| placed.node.skin.is_some()) {
-        warnings.push("skins aren't supported; the meshes are rendered as they are in the file".into());
+    if !root.animations.is_empty() && options.frame_time.is_none() {
+        warnings.push(
+            "its animations need a time (--frame-time SECONDS); the nodes are rendered where they stand at rest".into(),
+        );
     }
 }

@@ -4,12 +4,14 @@
 //! and their longest half axis is 1. Whatever the units and the place of the scene, f32 then has the same precision.
 
 mod accessor;
+mod animation;
 mod attributes;
 mod buffer;
 mod builder;
 mod bvh;
 mod camera;
 mod contact;
+mod curve;
 mod diagnostic;
 mod document;
 mod elements;
@@ -22,11 +24,15 @@ mod instance;
 mod light;
 mod load;
 mod material;
+mod morph;
 pub mod object_grid;
 mod packed;
 mod primitive;
+mod skin;
+mod tangents;
 
 pub use features::SceneFeatures;
+pub use load::LoadOptions;
 pub use packed::PackedScene;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};

@@ -1,5 +1,6 @@
 //! A mesh primitive as a list of triangles, whatever its topology and index type.
 
+use glam::Vec4;
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Mesh, mesh};
@@ -8,6 +9,8 @@ use super::accessor::Integers;
 use super::attributes::Attributes;
 use super::diagnostic::{Check, Warnings, damaged, label};
 use super::document::Document;
+use super::instance::Corner;
+use super::tangents::tangents;
 
 /// A primitive whose accessors were checked. Only its indices and vertices are still to be.
 pub(super) struct Primitive<'a> {
@@ -17,6 +20,8 @@ pub(super) struct Primitive<'a> {
     pub attributes: Attributes<'a>,
     topology: Topology,
     indices: Option<Integers<'a, 1>>,
+    /// Tangents of the corners of each triangle, where the file has none and the material needs them.
+    generated_tangents: Option<Vec<[Vec4; 3]>>,
 }
 
 /// How a sequence of vertices forms triangles.
@@ -31,7 +36,6 @@ impl<'a> Primitive<'a> {
     /// Opens a primitive; `None` if it has no triangles. Parts that aren't supported are added to `warnings`.
     pub(super) fn open(
         document: &'a Document,
-        mesh: &Mesh,
         primitive: &mesh::Primitive,
         label: &str,
         warnings: &mut Warnings,
@@ -68,13 +72,19 @@ impl<'a> Primitive<'a> {
             }
         })?;
 
-        warn_of_ignored(mesh, primitive, label, warnings);
-        let opened = Self {
+        warn_of_ignored(primitive, label, warnings);
+        let mut opened = Self {
             material,
             attributes,
             topology,
             indices,
+            generated_tangents: None,
         };
+        if !opened.attributes.has_tangents()
+            && let Some(set) = normal_texture_set(document, material)
+        {
+            opened.generated_tangents = tangents(&opened, set)?;
+        }
         let excess = opened.sequence_length() % 3;
         if matches!(topology, Topology::List) && excess != 0 {
             warnings.push(format!(
@@ -113,6 +123,17 @@ impl<'a> Primitive<'a> {
         Ok(vertices)
     }
 
+    /// Whether the corners that share a vertex may have different tangents.
+    pub(super) fn splits_vertices(&self) -> bool {
+        self.generated_tangents.is_some()
+    }
+
+    /// The tangent at a corner where the file has none, in the mesh's space.
+    pub(super) fn generated_tangent(&self, corner: Corner) -> Option<Vec4> {
+        let tangents = self.generated_tangents.as_ref()?;
+        Some(tangents[corner.triangle][corner.place])
+    }
+
     fn sequence_length(&self) -> usize {
         self.indices.map_or(self.attributes.len(), |indices| indices.len())
     }
@@ -124,17 +145,22 @@ pub(super) fn primitive_label(mesh_index: usize, mesh: &Mesh, primitive_index: u
     format!("{mesh}, primitive {primitive_index}")
 }
 
-fn warn_of_ignored(mesh: &Mesh, primitive: &mesh::Primitive, label: &str, warnings: &mut Warnings) {
+/// The set of texture coordinates that a material's normal texture is looked up by, if it has one.
+fn normal_texture_set(document: &Document, material: usize) -> Option<usize> {
+    let texture = document.root.materials.get(material)?.normal_texture.as_ref()?;
+    let extensions = texture.extensions.as_ref();
+    let transform = extensions.and_then(|extensions| extensions.others.get("KHR_texture_transform"));
+    let set = transform.and_then(|transform| transform.get("texCoord")?.as_u64());
+    usize::try_from(set.unwrap_or(texture.tex_coord.into()))
+        .ok()
+        .filter(|&set| set < 2)
+}
+
+fn warn_of_ignored(primitive: &mesh::Primitive, label: &str, warnings: &mut Warnings) {
     let is_color = |semantic: &Checked<Semantic>| matches!(semantic, Checked::Valid(Semantic::Colors(_)));
     if primitive.attributes.keys().any(is_color) {
         warnings.push(format!(
             "{label}: its vertex colours aren't supported yet and are left out"
-        ));
-    }
-    let is_morphed = primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty());
-    if is_morphed || mesh.weights.is_some() {
-        warnings.push(format!(
-            "{label}: its morph targets aren't supported; the base shape is rendered"
         ));
     }
 }

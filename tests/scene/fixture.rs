@@ -7,7 +7,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 use ppm_vk::error::{Error, Result};
-use ppm_vk::scene::Scene;
+use ppm_vk::scene::{LoadOptions, Scene};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -194,6 +194,46 @@ impl Fixture {
     pub fn load(&self) -> Result<Scene> {
         self.write("room.bin", &self.binary);
         self.load_bytes("room.gltf", self.json.to_string().as_bytes())
+    }
+
+    /// Loads it as it is at a time.
+    pub fn load_at(&self, time: f64) -> Result<Scene> {
+        self.write("room.bin", &self.binary);
+        self.write("room.gltf", self.json.to_string().as_bytes());
+        let options = LoadOptions { frame_time: Some(time) };
+        Scene::load_with(&self.path("room.gltf"), options)
+    }
+
+    /// The same, which must succeed without warnings.
+    #[track_caller]
+    pub fn scene_at(&self, time: f64) -> Scene {
+        match self.load_at(time) {
+            Ok(scene) => {
+                assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+                scene
+            }
+            Err(error) => panic!("should load, but: {error}"),
+        }
+    }
+
+    /// Animates a property of a node: keyframe times, and the accessor of the values.
+    pub fn animate(&mut self, node: usize, path: &str, interpolation: &str, times: &[f32], output: usize) -> &mut Self {
+        let input = self.add_floats("SCALAR", 1, times);
+        if self.json["animations"].is_null() {
+            self.set("/animations", json!([{"samplers": [], "channels": []}]));
+        }
+        let sampler = self.json["animations"][0]["samplers"]
+            .as_array()
+            .expect("samplers")
+            .len();
+        self.set(
+            "/animations/0/samplers/-",
+            json!({"input": input, "output": output, "interpolation": interpolation}),
+        );
+        self.set(
+            "/animations/0/channels/-",
+            json!({"sampler": sampler, "target": {"node": node, "path": path}}),
+        )
     }
 
     /// Loads it as a `.gltf` file with the buffer in a data URI.

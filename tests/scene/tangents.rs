@@ -1,0 +1,61 @@
+//! Tangents where the file has none.
+
+use glam::{Vec3, Vec4};
+use serde_json::json;
+
+use crate::fixture::{Fixture, assert_close};
+
+/// The room with texture coordinates on the floor, the texture's left along −x and its top along −z, and a material that
+/// has a normal texture.
+fn textured() -> Fixture {
+    let mut room = Fixture::room();
+    let texcoords = room.add_floats("VEC2", 2, &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]);
+    room.set("/meshes/0/primitives/0/attributes/TEXCOORD_0", json!(texcoords));
+    room.set("/materials/0/normalTexture", json!({"index": 0}));
+    room.set("/textures", json!([{}]));
+    room
+}
+
+#[test]
+fn a_normal_texture_gets_tangents_along_u_and_up() {
+    let scene = textured().scene();
+    assert_eq!(scene.tangents.len(), scene.positions.len());
+    for (&tangent, &normal) in scene.tangents.iter().zip(&scene.normals).take(4) {
+        assert_close(tangent.truncate(), [1.0, 0.0, 0.0]);
+        // glTF's bitangent points up the texture, against v.
+        let bitangent = tangent.w * normal.cross(tangent.truncate());
+        assert_close(bitangent, [0.0, 0.0, -1.0]);
+    }
+    assert!(scene.tangents[4..].iter().all(|&tangent| tangent == Vec4::ZERO));
+}
+
+#[test]
+fn a_mirrored_texture_turns_the_bitangent_round_and_splits_the_seam() {
+    let mut room = textured();
+    // The two triangles of the floor share an edge; u runs the other way on the second.
+    let texcoords = room.add_floats("VEC2", 2, &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, -1.0, 0.0]);
+    room.set("/meshes/0/primitives/0/attributes/TEXCOORD_0", json!(texcoords));
+    let scene = room.scene();
+    let signs: Vec<f32> = scene.triangles[..2]
+        .iter()
+        .map(|triangle| scene.tangents[triangle.vertices[0] as usize].w)
+        .collect();
+    assert_eq!(signs[0], -signs[1]);
+    assert_eq!(scene.positions.len(), 6 + 3, "two vertices lie on the seam");
+}
+
+#[test]
+fn without_a_normal_texture_none_are_made() {
+    let mut room = textured();
+    room.remove("/materials/0/normalTexture");
+    assert!(room.scene().tangents.is_empty());
+}
+
+#[test]
+fn the_second_set_serves_where_the_texture_asks_for_it() {
+    let mut room = textured();
+    let turned = room.add_floats("VEC2", 2, &[0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+    room.set("/meshes/0/primitives/0/attributes/TEXCOORD_1", json!(turned));
+    room.set("/materials/0/normalTexture/texCoord", json!(1));
+    assert_close(room.scene().tangents[0].truncate(), Vec3::Z.to_array());
+}
