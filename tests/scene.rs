@@ -10,6 +10,8 @@ mod assets;
 mod attributes;
 #[path = "scene/cameras.rs"]
 mod cameras;
+#[path = "scene/compressed.rs"]
+mod compressed;
 #[path = "scene/damaged.rs"]
 mod damaged;
 #[path = "scene/deformation.rs"]

@@ -10,6 +10,7 @@ use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::{Buffer, Root};
 
 use super::diagnostic::{Check, damaged, label, quote};
+use super::meshopt;
 
 /// Base64 that may lack its padding, which some exporters leave out.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -20,7 +21,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// The most that all buffers of a scene may hold, in bytes: a small file can name a large one a thousand times.
-const MAX_TOTAL_SIZE: u64 = 1 << 33;
+pub(super) const MAX_TOTAL_SIZE: u64 = 1 << 33;
 
 /// Reads each buffer of `root`. `folder` holds the scene file, `binary` is the binary chunk of a `.glb`.
 pub(super) fn read_all(root: &Root, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<Vec<u8>>> {
@@ -47,6 +48,9 @@ pub(super) fn read_all(root: &Root, folder: &Path, binary: Option<Vec<u8>>) -> C
 
 fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8>> {
     let length = buffer.byte_length.0;
+    if buffer.uri.is_none() && binary.is_none() && meshopt::is_fallback(buffer) {
+        return Ok(Vec::new());
+    }
     let (mut bytes, source) = match &buffer.uri {
         None => (
             binary.ok_or_else(|| damaged("it has no uri, and the file no binary chunk for it"))?,
@@ -69,6 +73,12 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8
     // What follows is padding.
     bytes.truncate(length as usize);
     Ok(bytes)
+}
+
+/// `length` bytes from byte `start`, if there are as many.
+pub(super) fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
+    let end = usize::try_from(start.checked_add(length)?).ok()?;
+    bytes.get(usize::try_from(start).ok()?..end)
 }
 
 /// Reads the first `length` bytes of a file, or all where it is shorter.

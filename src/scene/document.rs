@@ -3,25 +3,28 @@
 //! The `gltf` crate's own reader is not used beyond its JSON types: its validation indexes accessors unchecked, takes
 //! `KHR_materials_volume` for unsupported, and rejects the custom attributes that the format allows.
 
+use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
 use gltf::json::Root;
+use gltf::json::buffer::View;
 use serde::Deserialize;
 
-use super::buffer;
+use super::buffer::{self, slice};
 use super::diagnostic::{Check, damaged, quote};
-use super::glb;
+use super::{glb, meshopt};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 6] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 7] = [
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_volume",
     QUANTIZATION,
+    meshopt::EXTENSION,
 ];
 
 /// The largest file that is read, in bytes: what a `.glb` header can express.
@@ -31,8 +34,10 @@ const MAX_FILE_SIZE: u64 = u32::MAX as u64;
 pub(super) struct Document {
     /// The JSON.
     pub root: Root,
-    /// One byte string per `root.buffers`, as long as its `byteLength`.
-    pub buffers: Vec<Vec<u8>>,
+    /// One byte string per `root.buffers`, as long as its `byteLength`, or empty where compressed views stand for it.
+    buffers: Vec<Vec<u8>>,
+    /// The bytes of the views that are stored compressed.
+    decoded_views: HashMap<usize, Vec<u8>>,
     /// Whether the file uses [`QUANTIZATION`].
     pub is_quantized: bool,
 }
@@ -74,12 +79,34 @@ impl Document {
         });
         let folder = path.parent().unwrap_or(Path::new(""));
         let buffers = buffer::read_all(&root, folder, binary)?;
+        let decoded_views = meshopt::decode_views(&root, &buffers)?;
         let mut extensions = root.extensions_used.iter().chain(&root.extensions_required);
         let is_quantized = extensions.any(|extension| extension == QUANTIZATION);
         Ok(Self {
             root,
             buffers,
+            decoded_views,
             is_quantized,
+        })
+    }
+
+    /// The bytes of the view at `index`, decoded where they are stored compressed.
+    pub(super) fn view_bytes(&self, index: usize, view: &View) -> Check<&[u8]> {
+        if let Some(bytes) = self.decoded_views.get(&index) {
+            return Ok(bytes);
+        }
+        let buffer_index = view.buffer.value();
+        let buffer = self.buffers.get(buffer_index).ok_or_else(|| {
+            let buffers = self.buffers.len();
+            format!("there is no buffer {buffer_index}, the file has {buffers}")
+        })?;
+        let start = view.byte_offset.unwrap_or_default().0;
+        slice(buffer, start, view.byte_length.0).ok_or_else(|| {
+            format!(
+                "bufferView {index} is {} bytes from byte {start} of buffer {buffer_index}, which has {}",
+                view.byte_length.0,
+                buffer.len()
+            )
         })
     }
 }

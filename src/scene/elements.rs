@@ -7,11 +7,12 @@ use gltf::json::buffer::View;
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
 
+use super::buffer::slice;
 use super::diagnostic::{Check, damaged, label};
 use super::document::Document;
 
 /// The most elements of an accessor that has no data of its own: no byte of the file stands behind their number.
-const MAX_ZEROS: u64 = 1 << 25;
+const MAX_ZEROS: u64 = 1 << 20;
 
 /// How components are stored.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -230,20 +231,7 @@ impl<'a> Packed<'a> {
         let view = views
             .get(view_index)
             .ok_or_else(|| format!("there is no bufferView {view_index}, the file has {}", views.len()))?;
-        let buffer_index = view.buffer.value();
-        let buffer = document.buffers.get(buffer_index).ok_or_else(|| {
-            let buffers = document.buffers.len();
-            format!("there is no buffer {buffer_index}, the file has {buffers}")
-        })?;
-
-        let view_start = view.byte_offset.unwrap_or_default().0;
-        let view_bytes = slice(buffer, view_start, view.byte_length.0).ok_or_else(|| {
-            format!(
-                "bufferView {view_index} is {} bytes from byte {view_start} of buffer {buffer_index}, which has {}",
-                view.byte_length.0,
-                buffer.len()
-            )
-        })?;
+        let view_bytes = document.view_bytes(view_index, view)?;
 
         // A stride of zero is how some files spell «tightly packed».
         let stride = match view.byte_stride {
@@ -277,9 +265,4 @@ fn span(count: u64, stride: usize, size: usize) -> Option<u64> {
         None => Some(0),
         Some(steps) => steps.checked_mul(stride as u64)?.checked_add(size as u64),
     }
-}
-
-fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
-    let end = usize::try_from(start.checked_add(length)?).ok()?;
-    bytes.get(usize::try_from(start).ok()?..end)
 }

@@ -24,6 +24,7 @@ mod instance;
 mod light;
 mod load;
 mod material;
+mod meshopt;
 mod morph;
 pub mod object_grid;
 mod packed;

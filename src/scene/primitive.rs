@@ -3,7 +3,7 @@
 use glam::Vec4;
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Mesh, mesh};
+use gltf::json::{Mesh, Root, mesh};
 
 use super::accessor::Integers;
 use super::attributes::Attributes;
@@ -11,6 +11,9 @@ use super::diagnostic::{Check, Warnings, damaged, label};
 use super::document::Document;
 use super::instance::Corner;
 use super::tangents::tangents;
+
+/// Compresses meshes.
+const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// A primitive whose accessors were checked. Only its indices and vertices are still to be.
 pub(super) struct Primitive<'a> {
@@ -52,6 +55,7 @@ impl<'a> Primitive<'a> {
             }
             Checked::Invalid => return Err(damaged("its mode is none of 0 to 6")),
         };
+        check_draco(&document.root, primitive)?;
         let Some(attributes) = Attributes::open(document, primitive)? else {
             warnings.push(format!("{label}: it has no POSITION and is skipped"));
             return Ok(None);
@@ -156,11 +160,26 @@ fn normal_texture_set(document: &Document, material: usize) -> Option<usize> {
         .filter(|&set| set < 2)
 }
 
+/// Data that Draco compressed is passed over where the file has it uncompressed as well, and refused otherwise.
+fn check_draco(root: &Root, primitive: &mesh::Primitive) -> Check<()> {
+    let extensions = primitive.extensions.as_ref();
+    let is_compressed = extensions.is_some_and(|extensions| extensions.others.contains_key(DRACO));
+    let mut accessors = primitive.attributes.values().chain(&primitive.indices);
+    let has_data = accessors.all(|accessor| {
+        let accessor = root.accessors.get(accessor.value());
+        accessor.is_none_or(|accessor| accessor.buffer_view.is_some() || accessor.sparse.is_some())
+    });
+    if is_compressed && !has_data {
+        return Err(format!(
+            "its data is there by {DRACO} alone, which isn't supported; export the scene without compression"
+        ));
+    }
+    Ok(())
+}
+
 fn warn_of_ignored(primitive: &mesh::Primitive, label: &str, warnings: &mut Warnings) {
     let is_color = |semantic: &Checked<Semantic>| matches!(semantic, Checked::Valid(Semantic::Colors(_)));
     if primitive.attributes.keys().any(is_color) {
-        warnings.push(format!(
-            "{label}: its vertex colours aren't supported yet and are left out"
-        ));
+        warnings.push(format!("{label}: its vertex colours aren't rendered yet"));
     }
 }

@@ -83,6 +83,27 @@ fn triangles_of_the_negative_scale_test_face_the_way_of_their_normals() {
 }
 
 #[test]
+fn a_box_that_meshopt_compressed_is_a_cube() {
+    let Some(fixture) = asset("compressed/BoxMeshopt/BoxMeshopt.glb") else {
+        return;
+    };
+    let soup = world_soup(&fixture.scene());
+    assert_eq!(soup.len(), 12);
+    for corner in soup.as_flattened() {
+        assert!((corner.abs() - 0.5).abs().max_element() < 1e-4, "{corner}");
+    }
+}
+
+#[test]
+fn boxes_that_draco_compressed_are_refused_by_name() {
+    for path in ["compressed/BoxDraco/BoxDraco.gltf", "compressed/KhrBoxDraco/Box.gltf"] {
+        if let Some(fixture) = asset(path) {
+            fixture.assert_fails(&["KHR_draco_mesh_compression"]);
+        }
+    }
+}
+
+#[test]
 fn assets_that_are_there_are_read() {
     // So that a folder that moved is noticed where it should be.
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets");

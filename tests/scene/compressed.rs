@@ -1,0 +1,142 @@
+//! Compressed meshes: by `EXT_meshopt_compression`, which is read, and by Draco, which isn't.
+
+use ppm_vk::scene::Scene;
+use serde_json::{Value, json};
+
+use crate::fixture::{Fixture, assert_close, assert_error};
+
+const MESHOPT: &str = "EXT_meshopt_compression";
+
+/// Makes the view of an accessor a compressed one.
+fn compress(room: &mut Fixture, accessor: usize, encoded: &[u8], stride: usize, count: usize, mode: &str) {
+    let offset = room.binary.len();
+    room.binary.extend_from_slice(encoded);
+    room.set("/buffers/0/byteLength", json!(room.binary.len()));
+    let view = room.json["accessors"][accessor]["bufferView"].as_u64().expect("a view");
+    let extension = json!({
+        "buffer": 0, "byteOffset": offset, "byteLength": encoded.len(),
+        "byteStride": stride, "count": count, "mode": mode
+    });
+    room.set(
+        &format!("/bufferViews/{view}"),
+        json!({"buffer": 1, "byteLength": stride * count, "extensions": {MESHOPT: extension}}),
+    );
+}
+
+/// The room with its floor compressed.
+fn compressed() -> Fixture {
+    let mut room = Fixture::room();
+    room.set("/extensionsUsed", json!([MESHOPT]));
+    room.set("/extensionsRequired", json!([MESHOPT]));
+    room.set(
+        "/buffers/-",
+        json!({"byteLength": 4096, "extensions": {MESHOPT: {"fallback": true}}}),
+    );
+    let vectors = |bytes: &[u8]| -> Vec<[u8; 12]> { bytes.as_chunks().0.to_vec() };
+    let (positions, normals) = (vectors(&room.binary[..48]), vectors(&room.binary[48..96]));
+    for (accessor, vectors) in [(0, positions), (1, normals)] {
+        let encoded = meshopt::encode_vertex_buffer(&vectors).expect("encoded");
+        compress(&mut room, accessor, &encoded, 12, 4, "ATTRIBUTES");
+    }
+    let encoded = meshopt::encode_index_buffer(&[0, 1, 2, 0, 2, 3], 4).expect("encoded");
+    compress(&mut room, 2, &encoded, 2, 6, "TRIANGLES");
+    room
+}
+
+#[track_caller]
+fn assert_same(scene: &Scene, other: &Scene) {
+    assert_eq!(scene.positions, other.positions);
+    assert_eq!(scene.normals, other.normals);
+    assert_eq!(scene.triangles, other.triangles);
+}
+
+#[test]
+fn compressed_views_are_what_they_were() {
+    let mut room = compressed();
+    let plain = Fixture::room().scene();
+    let scene = room.scene();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    assert_same(&scene, &plain);
+    let encoded = meshopt::encode_index_sequence(&[0, 1, 2, 0, 2, 3], 4).expect("encoded");
+    compress(&mut room, 2, &encoded, 4, 6, "INDICES");
+    room.set("/accessors/2/componentType", json!(5125));
+    assert_same(&room.scene(), &plain);
+}
+
+#[test]
+fn filters_are_undone() {
+    let mut room = compressed();
+    let view = |accessor: usize| format!("/bufferViews/{accessor}/extensions/{MESHOPT}/filter");
+    let plain = Fixture::room().scene();
+    let positions: Vec<[f32; 3]> = room.binary[..48]
+        .as_chunks::<12>()
+        .0
+        .iter()
+        .map(|bytes| bytemuck::pod_read_unaligned(bytes))
+        .collect();
+    let exponential = meshopt::encode_filter_exp(&positions, 15, meshopt::EncodeExpMode::SharedVector);
+    let encoded = meshopt::encode_vertex_buffer(&exponential).expect("encoded");
+    compress(&mut room, 0, &encoded, 12, 4, "ATTRIBUTES");
+    room.set(&view(0), json!("EXPONENTIAL"));
+    assert_same(&room.scene(), &plain);
+
+    let normals: Vec<[i8; 4]> = meshopt::encode_filter_oct(&[[0.0, 1.0, 0.0, 0.0]; 4], 8);
+    let encoded = meshopt::encode_vertex_buffer(&normals).expect("encoded");
+    compress(&mut room, 1, &encoded, 4, 4, "ATTRIBUTES");
+    room.set("/bufferViews/1/byteStride", json!(4));
+    room.set(&view(1), json!("OCTAHEDRAL"));
+    room.set("/accessors/1/componentType", json!(5120));
+    room.set("/accessors/1/normalized", json!(true));
+    room.set("/extensionsRequired/-", json!("KHR_mesh_quantization"));
+    for normal in &room.scene().normals[..4] {
+        assert_close(*normal, [0.0, 1.0, 0.0]);
+    }
+}
+
+#[test]
+fn damaged_compression_is_named() {
+    let fails = |key: &str, value: Value, parts: &[&str]| {
+        let mut room = compressed();
+        room.set(&format!("/bufferViews/0/extensions/{MESHOPT}/{key}"), value);
+        assert_error(room.load(), &[&["bufferView 0", MESHOPT], parts].concat());
+    };
+    fails("mode", json!("TEXTURES"), &["TEXTURES"]);
+    fails("filter", json!("OCTAHEDRAL"), &["a stride of 12"]);
+    fails("byteStride", json!(6), &["a stride of 6"]);
+    fails("byteStride", json!(0), &["a stride of 0"]);
+    fails("count", json!(5), &["5 elements"]);
+    fails("count", json!(u64::MAX), &["elements"]);
+    fails("buffer", json!(9), &["buffer 9"]);
+    fails("byteLength", json!(1 << 20), &["buffer 0"]);
+    fails("byteLength", json!(20), &["20 bytes", "Attributes"]);
+    let mut room = compressed();
+    room.set("/bufferViews/0/byteLength", json!(12u64 << 40));
+    room.set(&format!("/bufferViews/0/extensions/{MESHOPT}/count"), json!(1u64 << 40));
+    room.assert_fails(&["can't stand for"]);
+}
+
+#[test]
+fn draco_is_refused_by_name_unless_the_file_has_plain_data_too() {
+    let draco = "KHR_draco_mesh_compression";
+    let mut room = Fixture::room();
+    room.set("/extensionsUsed", json!([draco]));
+    room.set(
+        "/meshes/0/primitives/0/extensions",
+        json!({draco: {"bufferView": 0, "attributes": {"POSITION": 0}}}),
+    );
+    let scene = room.assert_warns(&[draco, "ignored"]);
+    assert_same(&scene, &Fixture::room().scene());
+    room.remove("/accessors/0/bufferView");
+    room.assert_fails(&["mesh 0 \"floor\", primitive 0", draco, "without compression"]);
+    room.set("/extensionsRequired", json!([draco]));
+    room.assert_fails(&["requires", draco]);
+}
+
+#[test]
+fn required_extensions_that_are_unknown_are_named() {
+    for extension in ["KHR_texture_basisu", "EXT_not_yet_invented"] {
+        let mut room = Fixture::room();
+        room.set("/extensionsRequired", json!([extension]));
+        room.assert_fails(&["requires", extension]);
+    }
+}
