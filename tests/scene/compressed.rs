@@ -24,7 +24,7 @@ fn compress(room: &mut Fixture, accessor: usize, encoded: &[u8], stride: usize, 
 }
 
 /// The room with its floor compressed.
-fn compressed() -> Fixture {
+pub fn compressed() -> Fixture {
     let mut room = Fixture::room();
     room.set("/extensionsUsed", json!([MESHOPT]));
     room.set("/extensionsRequired", json!([MESHOPT]));

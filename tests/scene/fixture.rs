@@ -196,12 +196,17 @@ impl Fixture {
         self.load_bytes("room.gltf", self.json.to_string().as_bytes())
     }
 
+    /// Writes a file into the folder and loads it as a scene at a time.
+    pub fn load_bytes_at(&self, name: &str, bytes: &[u8], time: f64) -> Result<Scene> {
+        self.write(name, bytes);
+        let options = LoadOptions { frame_time: Some(time) };
+        Scene::load_with(&self.path(name), options)
+    }
+
     /// Loads it as it is at a time.
     pub fn load_at(&self, time: f64) -> Result<Scene> {
         self.write("room.bin", &self.binary);
-        self.write("room.gltf", self.json.to_string().as_bytes());
-        let options = LoadOptions { frame_time: Some(time) };
-        Scene::load_with(&self.path("room.gltf"), options)
+        self.load_bytes_at("room.gltf", self.json.to_string().as_bytes(), time)
     }
 
     /// The same, which must succeed without warnings.
