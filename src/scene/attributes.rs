@@ -114,6 +114,11 @@ impl<'a> Attributes<'a> {
         Err(damaged(format_args!("the normal of vertex {vertex} isn't finite")))
     }
 
+    /// Whether the file gives texture coordinates of any set.
+    pub(super) fn has_texcoords(&self) -> bool {
+        self.texcoords.iter().any(Option::is_some)
+    }
+
     /// Whether the file gives tangents.
     pub(super) fn has_tangents(&self) -> bool {
         self.tangents.is_some()
@@ -133,7 +138,7 @@ impl<'a> Attributes<'a> {
 
     /// Texture coordinates of a vertex, those of a missing set zero; `None` where the file gives none.
     pub(super) fn texcoords(&self, vertex: usize) -> Option<Result<[Vec2; 2], NotFinite>> {
-        if self.texcoords.iter().all(Option::is_none) {
+        if !self.has_texcoords() {
             return None;
         }
         let pair = self.texcoords.map(|set| match set {

@@ -83,6 +83,12 @@ pub(super) fn instances<'a>(
             }
             let attributes = &primitive.attributes;
             let at_node = |what| format!("{}: {what}", node_label(&document.root, placed.index));
+            if placed.node.skin.is_some() && !attributes.is_skinned() {
+                let label = primitive_label(mesh_index, mesh, primitive_index);
+                warnings.push(format!(
+                    "{label}: it has no joints and weights to follow a skin by; it follows its node"
+                ));
+            }
             let targets = attributes.morph_target_count();
             let morph = morph::weights(placed, pose, mesh.weights.as_deref(), targets).map_err(at_node)?;
             let skin = placed.node.skin.map(|skin| skins.matrices(skin.value()));

@@ -10,7 +10,7 @@ use super::attributes::Attributes;
 use super::diagnostic::{Check, Warnings, damaged, label};
 use super::document::Document;
 use super::instance::Corner;
-use super::tangents::tangents;
+use super::tangents::{MAX_AROUND, tangents};
 
 /// Compresses meshes.
 const DRACO: &str = "KHR_draco_mesh_compression";
@@ -85,9 +85,16 @@ impl<'a> Primitive<'a> {
             generated_tangents: None,
         };
         if !opened.attributes.has_tangents()
+            && opened.attributes.has_texcoords()
             && let Some(set) = normal_texture_set(document, material)
         {
             opened.generated_tangents = tangents(&opened, set)?;
+            if opened.generated_tangents.is_none() {
+                warnings.push(format!(
+                    "{label}: its normal texture needs tangents, which can't be made: more than {MAX_AROUND} of its \
+                     triangles meet in a point"
+                ));
+            }
         }
         let excess = opened.sequence_length() % 3;
         if matches!(topology, Topology::List) && excess != 0 {

@@ -10,7 +10,7 @@ use super::facet::face_normal;
 use super::primitive::Primitive;
 
 /// The most triangles around one vertex: the algorithm visits them by recursion.
-const MAX_AROUND: u32 = 4096;
+pub(super) const MAX_AROUND: u32 = 4096;
 
 /// The triangles of a primitive as the algorithm reads them.
 struct Corners {
@@ -21,7 +21,7 @@ struct Corners {
 }
 
 /// Tangents of each triangle's corners for the texture coordinates of a set, as the file would have them; zero where
-/// there is none. `None` if the primitive has no such set or too many triangles meet in a vertex.
+/// there is none. `None` if more than [`MAX_AROUND`] triangles meet in a point.
 pub(super) fn tangents(primitive: &Primitive<'_>, set: usize) -> Check<Option<Vec<[Vec4; 3]>>> {
     let mut corners = Corners {
         positions: Vec::new(),
@@ -38,10 +38,8 @@ pub(super) fn tangents(primitive: &Primitive<'_>, set: usize) -> Check<Option<Ve
         let mut texcoords = [Vec2::ZERO; 3];
         for (corner, &vertex) in vertices.iter().enumerate() {
             positions[corner] = attributes.position(vertex, &[])?;
-            match attributes.texcoords(vertex) {
-                Some(Ok(sets)) => texcoords[corner] = sets[set],
-                Some(Err(_)) => {}
-                None => return Ok(None),
+            if let Some(Ok(sets)) = attributes.texcoords(vertex) {
+                texcoords[corner] = sets[set];
             }
         }
         let flat = face_normal(positions).unwrap_or(DVec3::Z);

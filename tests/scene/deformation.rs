@@ -118,6 +118,14 @@ fn inverse_bind_matrices_undo_the_place_of_a_joint_at_rest() {
 }
 
 #[test]
+fn a_mesh_that_cannot_follow_its_skin_follows_its_node_with_a_warning() {
+    let mut room = skinned();
+    room.remove("/meshes/1/primitives/0/attributes/WEIGHTS_0");
+    let scene = room.assert_warns(&["mesh 1 \"lamp\", primitive 0", "skin"]);
+    assert_close(lamp(&scene)[1], [1.0, 1.0, 0.0]);
+}
+
+#[test]
 fn damaged_skins_are_named() {
     let fails = |pointer: &str, value, parts: &[&str]| {
         let mut room = skinned();

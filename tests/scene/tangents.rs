@@ -52,6 +52,29 @@ fn without_a_normal_texture_none_are_made() {
 }
 
 #[test]
+fn triangles_beyond_number_around_a_point_are_named() {
+    let mut room = textured();
+    let rim = (0..5000).map(|at| {
+        let angle = at as f32 * 1e-3;
+        [angle.cos(), 0.0, -angle.sin()]
+    });
+    let positions: Vec<[f32; 3]> = std::iter::once([0.0; 3]).chain(rim).collect();
+    let texcoords = room.add_floats("VEC2", 2, &vec![0.5; 2 * positions.len()]);
+    let positions = room.add_vectors(&positions);
+    room.set(
+        "/meshes/0/primitives/0",
+        json!({"attributes": {"POSITION": positions, "TEXCOORD_0": texcoords}, "material": 0, "mode": 6}),
+    );
+    let scene = room.scene();
+    assert!(scene.tangents.is_empty());
+    let warnings = scene.warnings.join("\n");
+    assert!(
+        warnings.contains("mesh 0 \"floor\", primitive 0: its normal texture needs tangents"),
+        "{warnings}"
+    );
+}
+
+#[test]
 fn the_second_set_serves_where_the_texture_asks_for_it() {
     let mut room = textured();
     let turned = room.add_floats("VEC2", 2, &[0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
