@@ -235,6 +235,7 @@ fn arguments_out_of_range_are_refused() {
         ("--time", "0"),
         ("--time", "1e300"),
         ("--time", "nan"),
+        ("--frame-time", "inf"),
         ("--gather", "magic"),
         ("--estimator", "magic"),
         ("--seed", "-1"),
@@ -247,6 +248,20 @@ fn arguments_out_of_range_are_refused() {
     }
     assert_refused(&ppm_vk(folder.path(), &["--quiet"]), "--scene");
     assert!(files(folder.path()).is_empty());
+}
+
+#[test]
+fn a_frame_time_asks_for_the_animations() {
+    let folder = TempDir::new().expect("folder");
+    let text = std::fs::read_to_string(scene("cornell.gltf")).expect("scene");
+    let mut json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let channel = serde_json::json!({"sampler": 7, "target": {"node": 0, "path": "translation"}});
+    json["animations"] = serde_json::json!([{"samplers": [], "channels": [channel]}]);
+    let copy = folder.path().join("animated.gltf");
+    std::fs::write(&copy, json.to_string()).expect("scene");
+    std::fs::copy(scene("cornell.bin"), folder.path().join("cornell.bin")).expect("buffer");
+    let output = small_render(folder.path(), &copy, &["--frame-time", "-1.5"]);
+    assert_fails(&folder, &output, &["animation 0, channel 0", "sampler 7"]);
 }
 
 #[test]
@@ -396,7 +411,7 @@ fn lists_go_to_stdout() {
         (vec!["devices"], vec!["driver", "storage buffer"]),
         (
             vec!["inspect", scene.to_str().expect("UTF-8")],
-            vec!["triangles", "1 mirror", "1 dielectric", "camera 0"],
+            vec!["triangles", "1 mirror", "1 dielectric", "camera 0", "memory", "MiB"],
         ),
         (vec!["--help"], vec!["--scene", "--profile-json"]),
         (vec!["--version"], vec!["ppm-vk"]),

@@ -6,8 +6,12 @@ use std::path::Path;
 use anyhow::Result;
 use serde_json::json;
 
+use super::progress::{BUILDING, READING, while_showing};
+use super::render::default_resolution;
+use crate::config::RenderConfig;
 use crate::gather::{METHODS, default_method};
 use crate::gpu;
+use crate::pipeline::Memory;
 use crate::scene::{PackedScene, Scene, Surface};
 
 /// `ppm-vk devices`.
@@ -58,8 +62,10 @@ pub fn gathers() -> Result<String> {
 
 /// `ppm-vk inspect`.
 pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
-    let scene = Scene::load(path)?;
-    let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(path, what))?;
+    let scene = while_showing(READING, false, || Scene::load(path))?;
+    let packed = while_showing(BUILDING, false, || PackedScene::new(&scene))
+        .map_err(|what| crate::error::Error::scene(path, what))?;
+    let memory = memory(&scene, &packed);
     let count = |is: fn(&Surface) -> bool| scene.materials.iter().filter(|material| is(&material.surface)).count();
     let to_world = |p: glam::Vec3| p.as_dvec3() / scene.normalisation.scale + scene.normalisation.centre;
     let (low, high) = scene.bounds();
@@ -79,6 +85,12 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
             "cameras": scene.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
             "features": packed.features.names(),
             "bounds": { "min": low.to_array(), "max": high.to_array() },
+            "device_memory": memory.map(|(memory, config)| json!({
+                "scene_bytes": memory.scene,
+                "render_bytes": memory.render,
+                "resolution": config.resolution,
+                "photons": config.photons,
+            })),
             "warnings": scene.warnings,
         });
         return Ok(serde_json::to_string_pretty(&value)? + "\n");
@@ -114,8 +126,29 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
         }
     )?;
     writeln!(text, "bounds       {low} to {high}")?;
+    if let Some((memory, config)) = memory {
+        let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+        let ([width, height], photons) = (config.resolution, config.photons);
+        writeln!(
+            text,
+            "memory       {:.1} MiB of the device for the scene, {:.1} MiB for {width}x{height} and {photons} photon paths",
+            mebibytes(memory.scene),
+            mebibytes(memory.render)
+        )?;
+    }
     for warning in &scene.warnings {
         writeln!(text, "warning      {warning}")?;
     }
     Ok(text)
+}
+
+/// What a render of the first camera takes on the best device with the settings that it has where the user gives none;
+/// `None` where there is no device.
+fn memory(scene: &Scene, packed: &PackedScene) -> Option<(Memory, RenderConfig)> {
+    let config = RenderConfig {
+        resolution: default_resolution(&scene.cameras[0]),
+        ..RenderConfig::default()
+    };
+    let device = gpu::best_device().ok()?;
+    Some((Memory::of(packed, &config, &device), config))
 }

@@ -1,5 +1,8 @@
-//! The progress bar: iterations, photons a second, time left.
+//! The progress bar: iterations, photons a second, time left; and a sign of life where there is nothing to count.
 
+use std::io::IsTerminal;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -91,6 +94,39 @@ impl Progress {
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
+}
+
+/// What a user waits for before a render.
+pub const READING: &str = "reading the scene";
+pub const BUILDING: &str = "building the hierarchy of its triangles";
+
+/// Work that takes longer than this shows that it goes on.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Does `work`, and shows for how long it has been at it once that is more than a second: neither a file's reader nor the
+/// hierarchy's builder tells how far it is.
+pub fn while_showing<T>(text: &'static str, quiet: bool, work: impl FnOnce() -> T) -> T {
+    if quiet || !std::io::stderr().is_terminal() {
+        return work();
+    }
+    let (done, end) = mpsc::channel::<()>();
+    thread::scope(|scope| {
+        scope.spawn(move || {
+            if end.recv_timeout(PATIENCE) != Err(RecvTimeoutError::Timeout) {
+                return;
+            }
+            let bar = ProgressBar::new_spinner().with_elapsed(PATIENCE).with_message(text);
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {
+                bar.set_style(style);
+            }
+            bar.enable_steady_tick(Duration::from_millis(100));
+            // Nothing is ever sent: the channel closes when the work ends, by a panic as well.
+            let _ = end.recv();
+            bar.finish_and_clear();
+        });
+        let _done = done;
+        work()
+    })
 }
 
 /// A number with a metric prefix.

@@ -10,7 +10,7 @@ use clap::error::ErrorKind;
 
 use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::outputs::check_outputs;
-use super::progress::{Limits, Progress, with_prefix};
+use super::progress::{BUILDING, Limits, Progress, READING, while_showing, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
 use crate::config::{RenderConfig, Sampler};
@@ -41,13 +41,15 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let options = LoadOptions {
         frame_time: arguments.frame_time,
     };
-    let scene = Scene::load_with(path, options)?;
+    let quiet = arguments.quiet;
+    let scene = while_showing(READING, quiet, || Scene::load_with(path, options))?;
     for warning in &scene.warnings {
         say!("warning: {warning}");
     }
     let camera = &scene.cameras[scene.camera_index(arguments.camera.as_deref())?];
     let config = config(arguments, gather, camera);
-    let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(path, what))?;
+    let packed = while_showing(BUILDING, quiet, || PackedScene::new(&scene))
+        .map_err(|what| crate::error::Error::scene(path, what))?;
     let mut backend = open(backend_choice, arguments.device.as_deref(), &packed, camera, &config)?;
     if arguments.radius.is_none() {
         say!(
@@ -194,10 +196,7 @@ fn open(
 
 fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> RenderConfig {
     RenderConfig {
-        resolution: arguments.resolution.unwrap_or_else(|| {
-            let height = DEFAULT_WIDTH as f32 / camera.aspect.unwrap_or(DEFAULT_ASPECT);
-            [DEFAULT_WIDTH, (height.round() as u32).clamp(1, crate::config::MAX_SIDE)]
-        }),
+        resolution: arguments.resolution.unwrap_or_else(|| default_resolution(camera)),
         photons: arguments.photons,
         estimator: arguments.estimator,
         direct: arguments.direct,
@@ -211,6 +210,12 @@ fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> Render
         sampler: arguments.sampler.unwrap_or(Sampler::of(arguments.estimator)),
         seed: arguments.seed,
     }
+}
+
+/// A picture's size where the user gives none.
+pub fn default_resolution(camera: &Camera) -> [u32; 2] {
+    let height = DEFAULT_WIDTH as f32 / camera.aspect.unwrap_or(DEFAULT_ASPECT);
+    [DEFAULT_WIDTH, (height.round() as u32).clamp(1, crate::config::MAX_SIDE)]
 }
 
 /// The scene's name with `.exr`, in the current folder.

@@ -24,6 +24,14 @@ pub fn devices() -> Result<Vec<DeviceSummary>> {
         .collect())
 }
 
+/// The device that is taken where the user names none.
+///
+/// # Errors
+/// No loader, or no device.
+pub fn best_device() -> Result<DeviceSummary> {
+    choose(Instance::shared()?.devices()?, None).map(|(_, summary)| summary)
+}
+
 /// An open device and its buffers.
 pub struct Device {
     pub(super) summary: DeviceSummary,
@@ -155,6 +163,11 @@ impl Device {
         });
         staging.free(&self.context);
         result.map(|_| ())
+    }
+
+    /// Bytes of all buffers.
+    pub fn bytes(&self) -> u64 {
+        self.buffers.values().map(|buffer| buffer.bytes).sum()
     }
 
     /// Bytes of the buffer `id`; 0 if it doesn't exist.

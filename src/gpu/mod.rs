@@ -10,4 +10,4 @@ mod pipeline;
 mod self_check;
 
 pub use context::DeviceSummary;
-pub use device::{Device, devices};
+pub use device::{Device, best_device, devices};

@@ -1,7 +1,10 @@
 //! A render on a Vulkan device. [`Stages::iteration`] has the order of the stages: it reads like figure 1 of the paper.
 
+mod memory;
 mod stages;
 
+pub use memory::Memory;
+use memory::{bindable_bytes, limits, scene_buffers};
 pub use stages::Stages;
 
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
@@ -40,20 +43,13 @@ pub struct Renderer {
 /// How often an iteration is done at the most: every other time halves what its loops have to do.
 const REPEATS: u32 = 24;
 
-/// Loop iterations that photon paths of a lane may make together where the driver has a limit: a subgroup's lanes share
-/// it on the driver that has one, and an inner loop runs as long as its slowest lane.
-fn loop_budget(limit: u32) -> u32 {
-    if limit == u32::MAX { limit } else { limit / 4 }
-}
-
 impl Renderer {
     /// Prepares a render: uploads the scene, finds the radius, resets the statistics.
     ///
     /// # Errors
     /// A setting outside its range, a device without enough memory, or a failed Vulkan call.
     pub fn new(device: Device, scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
-        let summary = device.summary();
-        let bindable = summary.max_storage_buffer_bytes.min(16 * u64::from(summary.max_texels));
+        let bindable = bindable_bytes(device.summary());
         Self::within(bindable, device, scene, camera, config)
     }
 
@@ -79,12 +75,7 @@ impl Renderer {
         }
         let limits = Limits {
             storage_buffer_bytes: buffer_bytes,
-            loop_limit: loop_budget(device.loop_limit()),
-            lanes: if device.summary().kind == "cpu" { 4096 } else { 1 << 18 },
-            splitting: scene.features.dielectric || scene.features.glossy,
-            glossy: scene.features.glossy,
-            meshes: scene.object_grids.len() as u32,
-            object_cells: scene.object_cells,
+            ..limits(device.summary(), device.loop_limit(), scene)
         };
         let triangles = scene.shading_triangles.len() as u32;
         if config.accel == Accel::Brute && triangles > limits.loop_limit {
@@ -95,12 +86,9 @@ impl Renderer {
             )));
         }
         let sizes = Sizes::new(&config, limits);
-        device.upload(BufferId::Bvh, &scene.bvh)?;
-        device.upload(BufferId::HavelTriangles, &scene.havel_triangles)?;
-        device.upload(BufferId::ShadingTriangles, &scene.shading_triangles)?;
-        device.upload(BufferId::Materials, &scene.materials)?;
-        device.upload(BufferId::Lights, &scene.lights)?;
-        device.upload(BufferId::ObjectGrids, &scene.object_grids)?;
+        for (id, bytes) in scene_buffers(scene) {
+            device.upload(id, bytes)?;
+        }
         let settings = settings(&config, scene, camera, limits.loop_limit);
         let mut renderer = Self {
             device,

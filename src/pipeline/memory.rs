@@ -1,0 +1,78 @@
+//! What a render takes of a device: how much memory, known before any of it is taken, and within which limits.
+
+use std::collections::BTreeSet;
+
+use super::stages::Stages;
+use crate::config::{Limits, RenderConfig, Sizes};
+use crate::gpu::DeviceSummary;
+use crate::layout::Settings;
+use crate::scene::PackedScene;
+use crate::stage::BufferId;
+
+/// Bytes of a device's memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Memory {
+    /// For the scene.
+    pub scene: u64,
+    /// For visible points, photons and the rest of a render.
+    pub render: u64,
+}
+
+impl Memory {
+    /// What a render on a device like this begins with. Later the photons' buffers are fitted to the photons that there
+    /// are, which are fewer as a rule.
+    pub fn of(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary) -> Self {
+        let sizes = Sizes::new(config, limits(device, u32::MAX, scene));
+        let stages = Stages {
+            config,
+            sizes: &sizes,
+            features: scene.features,
+        };
+        let recordings = [stages.iteration(0), stages.picture(1, 1)];
+        let buffers: BTreeSet<_> = recordings.iter().flat_map(|recording| recording.buffers()).collect();
+        let render: u64 = buffers.iter().filter_map(|&id| sizes.bytes(id)).sum();
+        Self {
+            scene: scene_buffers(scene).iter().map(|(_, bytes)| bytes.len() as u64).sum(),
+            render: render + size_of::<Settings>() as u64,
+        }
+    }
+}
+
+/// Loop iterations that photon paths of a lane may make together where the driver has a limit: a subgroup's lanes share
+/// it on the driver that has one, and an inner loop runs as long as its slowest lane.
+fn loop_budget(limit: u32) -> u32 {
+    if limit == u32::MAX { limit } else { limit / 4 }
+}
+
+/// Bytes that a stage can see of a buffer, as words or as texels.
+pub(super) fn bindable_bytes(device: &DeviceSummary) -> u64 {
+    device.max_storage_buffer_bytes.min(16 * u64::from(device.max_texels))
+}
+
+/// What the sizes of a render of a scene depend on.
+pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScene) -> Limits {
+    Limits {
+        storage_buffer_bytes: bindable_bytes(device),
+        loop_limit: loop_budget(loop_limit),
+        lanes: if device.kind == "cpu" { 4096 } else { 1 << 18 },
+        splitting: scene.features.dielectric || scene.features.glossy,
+        glossy: scene.features.glossy,
+        meshes: scene.object_grids.len() as u32,
+        object_cells: scene.object_cells,
+    }
+}
+
+/// The buffers that hold the scene.
+pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 6] {
+    [
+        (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
+        (BufferId::HavelTriangles, bytemuck::cast_slice(&scene.havel_triangles)),
+        (
+            BufferId::ShadingTriangles,
+            bytemuck::cast_slice(&scene.shading_triangles),
+        ),
+        (BufferId::Materials, bytemuck::cast_slice(&scene.materials)),
+        (BufferId::Lights, bytemuck::cast_slice(&scene.lights)),
+        (BufferId::ObjectGrids, bytemuck::cast_slice(&scene.object_grids)),
+    ]
+}
