@@ -8,6 +8,17 @@ pub const NO_OBJECT: u32 = u32::MAX;
 /// Light of a triangle that doesn't emit.
 pub const NO_LIGHT: u32 = u32::MAX;
 
+/// [`Light::kind`] of a triangle that emits.
+pub const TRIANGLE_LIGHT: u32 = 0;
+/// [`Light::kind`] of a point that shines in all directions.
+pub const POINT_LIGHT: u32 = 1;
+/// [`Light::kind`] of a point that shines into a cone.
+pub const SPOT_LIGHT: u32 = 2;
+/// [`Light::kind`] of a light so far away that its rays are parallel.
+pub const DIRECTIONAL_LIGHT: u32 = 3;
+/// [`Light::kind`] of the environment. There is one at the most, and it is the last light.
+pub const ENVIRONMENT_LIGHT: u32 = 4;
+
 /// Bit of a reference to a [`BvhRecord`]: it is a triangle of a leaf.
 pub const LEAF: u32 = 1 << 31;
 
@@ -66,7 +77,7 @@ device_structs! {
         pub slots_per_pixel: u32,
         /// The user's seed.
         pub seed: u32,
-        /// Emissive triangles.
+        /// Lights.
         pub light_count: u32,
         /// Zero.
         pub padding: u32,
@@ -161,16 +172,34 @@ device_structs! {
         pub thin: u32,
     }
 
-    /// An emissive triangle.
-    pub struct Light: 16 {
-        /// Index of the triangle.
+    /// A light, and a cell of the alias table that chooses one. What its kind doesn't use is zero.
+    pub struct Light: 80 {
+        /// Triangle: its index.
         pub triangle: u32,
-        /// Probability of this light and those before it.
-        pub cumulative: f32,
         /// Its probability, nearly in proportion to its flux.
         pub probability: f32,
-        /// Area.
+        /// Area of the triangle, or of the disc that a distant light's photons start from.
         pub area: f32,
+        /// [`TRIANGLE_LIGHT`], [`POINT_LIGHT`], [`SPOT_LIGHT`], [`DIRECTIONAL_LIGHT`] or [`ENVIRONMENT_LIGHT`].
+        pub kind: u32,
+        /// Of the cell: the part of it that chooses this light.
+        pub accept: f32,
+        /// Of the cell: the light that the rest of it chooses.
+        pub alias: u32,
+        /// Zero.
+        pub padding: [u32; 2],
+        /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB.
+        pub intensity: [f32; 3],
+        /// Spot: 1 − cos of the angle where it begins to fall off.
+        pub inner: f32,
+        /// Point, spot: where it is. Directional: centre of the disc.
+        pub position: [f32; 3],
+        /// Spot: 1 − cos of the angle where it ends.
+        pub outer: f32,
+        /// Spot, directional: unit vector that it shines along.
+        pub direction: [f32; 3],
+        /// Point, spot: 1 over the distance that it reaches, 0 where it reaches any.
+        pub inverse_range: f32,
     }
 
     /// The paper's hitpoint.

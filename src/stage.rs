@@ -20,6 +20,8 @@ pub enum BufferId {
     Materials,
     /// [`crate::layout::Light`]s.
     Lights,
+    /// What shines from afar, and how directions are chosen from it; see `glsl/shared/environment.glsl`.
+    Environment,
     /// [`crate::layout::VisiblePoint`]s in slot order.
     VisiblePoints,
     /// [`crate::layout::Gloss`] of each slot, where the scene has glossy surfaces.

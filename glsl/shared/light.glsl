@@ -1,45 +1,112 @@
-// Emissive triangles. Include after scene.glsl.
+// Lights. Include after scene.glsl.
+
+const uint TRIANGLE_LIGHT = 0u;
+const uint POINT_LIGHT = 1u;
+const uint SPOT_LIGHT = 2u;
+const uint DIRECTIONAL_LIGHT = 3u;
+const uint ENVIRONMENT_LIGHT = 4u;
+
+// Mirrors the first texel of `layout::Light`: all there is of a triangle.
 struct Light {
     uint triangle;
-    float cumulative;  // probability of this light and those before it
     float probability; // nearly in proportion to its flux
-    float area;        // render units²
+    float area;        // of the triangle, or of the disc that a distant light's photons start from; render units²
+    uint kind;
+};
+
+// The rest of `layout::Light`, without the table's cell.
+struct PunctualLight {
+    vec3 intensity;      // point, spot: along the axis. Directional: irradiance across the rays
+    vec3 position;       // directional: centre of the disc
+    vec3 direction;      // that it shines along
+    float inner;         // spot: 1 − cos of the angle where it begins to fall off
+    float outer;         // spot: 1 − cos of the angle where it ends
+    float inverse_range; // point, spot: 0 where it has no range
 };
 
 uniform usamplerBuffer Lights;
 
+const uint LIGHT_TEXELS = 5u;
+
 Light light_at(uint i) {
-    uvec4 bits = TEXEL_BITS(Lights, i);
-    return Light(bits.x, uintBitsToFloat(bits.y), uintBitsToFloat(bits.z), uintBitsToFloat(bits.w));
+    uvec4 bits = TEXEL_BITS(Lights, LIGHT_TEXELS * i);
+    return Light(bits.x, uintBitsToFloat(bits.y), uintBitsToFloat(bits.z), bits.w);
 }
 
-// A light, and the part of [0, 1) that chooses it.
+PunctualLight punctual_light_at(uint i) {
+    vec4 intensity_inner = TEXEL(Lights, LIGHT_TEXELS * i + 2u);
+    vec4 position_outer = TEXEL(Lights, LIGHT_TEXELS * i + 3u);
+    vec4 direction_range = TEXEL(Lights, LIGHT_TEXELS * i + 4u);
+    return PunctualLight(intensity_inner.rgb, position_outer.xyz, direction_range.xyz, intensity_inner.w,
+                         position_outer.w, direction_range.w);
+}
+
+bool is_punctual(uint kind) {
+    return kind == POINT_LIGHT || kind == SPOT_LIGHT || kind == DIRECTIONAL_LIGHT;
+}
+
+// A light, and what is left of the number that chose it, uniform in [0, 1].
 struct Choice {
     uint light;
-    float before;
-    float width;
+    float rest;
 };
 
-// The light at u in [0, 1), by bisection of the cumulative probabilities.
-Choice choose_light(float u) {
-    uint low = 0u;
-    uint high = settings.light_count - 1u;
-    float before = 0.0;
-    float end = 1.0;
-    while (low < high) {
-        uint middle = (low + high) / 2u;
-        float cumulative = light_at(middle).cumulative;
-        if (u < cumulative) {
-            high = middle;
-            end = cumulative;
-        } else {
-            low = middle + 1u;
-            before = cumulative;
-        }
+// By the alias method: Vose, «A Linear Algorithm For Generating Random Numbers With a Given Distribution», IEEE
+// Transactions on Software Engineering 17(9), 1991. u has 24 bits, and the two `digits` below it as many again: a light
+// of one photon in 10¹² is then chosen as often as it should be.
+Choice choose_light(float u, vec2 digits) {
+    uvec3 bits = uvec3(vec3(u, digits) * 16777216.0);
+    // A fraction of 64 bits times the number of cells: the cell, and a fraction of 64 bits within it.
+    uint cell, part, carried, lower_part, carry;
+    umulExtended(bits.x << 8u | bits.y >> 16u, settings.light_count, cell, part);
+    umulExtended(bits.y << 16u | bits.z >> 8u, settings.light_count, carried, lower_part);
+    part = uaddCarry(part, carried, carry);
+    cell += carry;
+    float within = float(part) * (1.0 / 4294967296.0) + float(lower_part) * (1.0 / 4294967296.0 / 4294967296.0);
+    vec4 entry = TEXEL(Lights, LIGHT_TEXELS * cell + 1u);
+    float accept = entry.x;
+    if (within < accept || accept >= 1.0) {
+        return Choice(cell, min(within / accept, 1.0));
     }
-    return Choice(low, before, end - before);
+    return Choice(floatBitsToUint(entry.y), min((within - accept) / (1.0 - accept), 1.0));
 }
 
+// Whether light leaves on the triangle's front, or on its back.
 bool emits(Material material, bool front) {
     return front || material.double_sided != 0u;
+}
+
+// How much of its intensity a spot has at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as
+// KHR_lights_punctual recommends.
+float spot_falloff(PunctualLight light, float versine) {
+    float ramp = clamp((light.outer - versine) / (light.outer - light.inner), 0.0, 1.0);
+    return ramp * ramp;
+}
+
+// What a light with a range has left at a distance: KHR_lights_punctual's window over the inverse square.
+float range_window(float inverse_range, float distance) {
+    float part = distance * inverse_range;
+    float part2 = part * part;
+    return clamp(1.0 - part2 * part2, 0.0, 1.0);
+}
+
+// What reaches a point from a punctual light if nothing is between.
+struct Arriving {
+    vec3 ray;        // to the light, or towards where it comes from
+    float end;       // of the ray, in its lengths
+    vec3 irradiance; // across the ray
+};
+
+Arriving arriving_from(PunctualLight light, uint kind, vec3 point) {
+    if (kind == DIRECTIONAL_LIGHT) {
+        return Arriving(-light.direction, 1e30, light.intensity);
+    }
+    vec3 ray = light.position - point;
+    float distance2 = max(dot(ray, ray), 1e-37);
+    vec3 irradiance = light.intensity * (range_window(light.inverse_range, sqrt(distance2)) / distance2);
+    if (kind == SPOT_LIGHT) {
+        vec3 off_axis = ray * inversesqrt(distance2) + light.direction;
+        irradiance *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
+    }
+    return Arriving(ray, 1.0, irradiance);
 }

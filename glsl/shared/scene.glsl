@@ -8,6 +8,8 @@ layout(constant_id = 10) const bool ROUGH_GLASS = false;
 layout(constant_id = 11) const bool THIN_WALLS = false;
 layout(constant_id = 12) const bool PARTLY_CLEAR = false;
 layout(constant_id = 13) const bool ABSORPTION = false;
+layout(constant_id = 14) const bool PUNCTUAL_LIGHTS = false;
+layout(constant_id = 15) const bool ENVIRONMENT = false;
 
 const uint MISS = 0xffffffffu;
 

@@ -7,7 +7,7 @@ layout(std140) uniform Settings {
     uvec2 resolution;           // pixels
     uint slots_per_pixel;       // visible points a pixel
     uint seed;
-    uint light_count;           // emissive triangles
+    uint light_count;           // lights
     uint padding;
     uint max_depth;             // bounces of a path at the most
     uint triangle_count;

@@ -14,6 +14,7 @@ layout(local_size_x = 64) in;
 #include "intersect.glsl"
 #include "bsdf.glsl"
 #include "contact.glsl"
+#include "environment.glsl"
 #include "light.glsl"
 #include "visible_point.glsl"
 #include "status.glsl"
@@ -43,6 +44,14 @@ struct Branch {
     bool emission_seen;   // what the next surface emits
 };
 
+// What a ray sees that meets no surface.
+vec3 radiance_from_afar(vec3 direction) {
+    if (ENVIRONMENT) {
+        return environment_at(direction).radiance;
+    }
+    return vec3(0.0);
+}
+
 // The first surface on a ray's way.
 struct Glimpse {
     vec3 emission;
@@ -51,8 +60,11 @@ struct Glimpse {
 
 Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium) {
     Hit hit = trace(origin, direction, 1e30, ignored, false);
-    if (loops_cut || hit.triangle == MISS) {
+    if (loops_cut) {
         return Glimpse(vec3(0.0), true);
+    }
+    if (hit.triangle == MISS) {
+        return Glimpse(radiance_from_afar(direction), true);
     }
     Encounter met = encounter(hit, direction, medium);
     bool dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
@@ -215,6 +227,8 @@ void main() {
                     vec4(weight, uintBitsToFloat(encode_direction(facing.geometric_normal)));
                 visible_point.emitted_normal.w = uintBitsToFloat(encode_direction(facing.shading_normal));
             }
+        } else if (!branch.emission_seen) {
+            branch.emitted += branch.throughput * radiance_from_afar(branch.direction);
         }
         if (ended) {
             visible_point.emitted_normal.rgb = branch.emitted;

@@ -14,6 +14,7 @@ layout(local_size_x = 64) in;
 #include "scene.glsl"
 #include "intersect.glsl"
 #include "bsdf.glsl"
+#include "environment.glsl"
 #include "light.glsl"
 #include "object_grid.glsl"
 #include "visible_point.glsl"
@@ -35,18 +36,62 @@ layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 // A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
 const float ENDS_BEFORE = 16.0 / 16777216.0;
 
+// A ray that asks a light whether it is seen.
+struct Question {
+    vec3 ray;
+    float end;       // of the ray, in its lengths
+    uint ignored;    // a triangle
+    uint kind;       // of the light
+    Surface emitter; // triangle: the light's point
+    Sky sky;         // environment
+    vec3 irradiance; // punctual: across the ray, over the light's probability
+};
+
+// Towards a light that u.x chooses.
+Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
+    uint chosen = choose_light(u.x, digits).light;
+    Light light = light_at(chosen);
+    Question question;
+    question.kind = light.kind;
+    question.end = 1e30;
+    question.ignored = MISS;
+    if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
+        Arriving arriving = arriving_from(punctual_light_at(chosen), light.kind, origin);
+        question.ray = arriving.ray;
+        question.end = arriving.end;
+        question.irradiance = arriving.irradiance / light.probability;
+    } else if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
+        question.sky = sample_environment(u.yz, question.ray);
+    } else {
+        Surface emitter = surface_at(light.triangle, triangle_point(u.yz));
+        bool front = dot(position - emitter.position, emitter.geometric_normal) > 0.0;
+        // Both ends move off their surfaces.
+        question.ray = offset_origin(emitter.position, front ? emitter.geometric_normal : -emitter.geometric_normal,
+                                     emitter.reach) - origin;
+        question.end = 1.0 - ENDS_BEFORE;
+        question.ignored = light.triangle;
+        question.emitter = emitter;
+    }
+    return question;
+}
+
 // One ray, by chance towards a point of a light or along a direction of the BSDF, with the density of both together
 // (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
-// variance next to a light.
+// variance next to a light. No direction of the BSDF meets a punctual light.
 vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     Random random = random_of_pixel(LIGHT_SAMPLE, slot, push.iteration, push.block, settings.seed);
     vec4 u = next4(random);
+    // What chooses among many lights needs more digits.
+    vec4 digits = settings.light_count > 1u ? next4(random) : vec4(0.0);
 
     vec3 position = visible_point.position_object.xyz;
     vec3 geometric_normal = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
     vec3 shading_normal = decode_direction(floatBitsToUint(visible_point.emitted_normal.w));
     vec3 origin = offset_origin(position, geometric_normal, reach_of(floatBitsToUint(visible_point.position_object.w)));
-    vec3 ray = cosine_direction(shading_normal, u.yz);
+    Question question;
+    question.ray = cosine_direction(shading_normal, u.yz);
+    question.end = 1e30;
+    question.ignored = MISS;
     // A reflection may be too narrow for points of lights to find it.
     Reflector reflector = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0);
     vec3 viewer = vec3(0.0);
@@ -56,53 +101,71 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
         Gloss gloss = GLOSS(slot);
         reflector = reflector_of(gloss);
         viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
-        if (reflector.alpha > 0.0) {
+        if (reflector.alpha > 0.0 && bsdf_sampling > 0.0) {
             bsdf_sampling = 0.5;
             reflections = reflection_probability(reflector, dot(shading_normal, viewer));
-            ray = u.x < reflections ? reflected_direction(reflector.alpha, shading_normal, viewer, u.yz) : ray;
+            if (u.x < reflections) {
+                question.ray = reflected_direction(reflector.alpha, shading_normal, viewer, u.yz);
+            }
         }
     }
     bool by_bsdf = u.w < bsdf_sampling;
-    uint ignored = MISS;
-    Surface emitter;
     if (!by_bsdf) {
-        Light light = light_at(choose_light(u.x).light);
-        emitter = surface_at(light.triangle, triangle_point(u.yz));
-        bool front = dot(position - emitter.position, emitter.geometric_normal) > 0.0;
-        // Both ends move off their surfaces.
-        ray = offset_origin(emitter.position, front ? emitter.geometric_normal : -emitter.geometric_normal,
-                            emitter.reach) - origin;
-        ignored = light.triangle;
+        question = ask_light(position, origin, u.xyz, digits.xz);
     }
+    vec3 ray = question.ray;
     if (dot(ray, geometric_normal) <= 0.0 || dot(ray, shading_normal) <= 0.0) {
         return vec3(0.0);
     }
-    Hit hit = trace(origin, ray, by_bsdf ? 1e30 : 1.0 - ENDS_BEFORE, ignored, !by_bsdf);
+    Hit hit = trace(origin, ray, question.end, question.ignored, !by_bsdf);
     if (loops_cut) {
         atomicAdd(status.cut_paths, 1u);
         return vec3(0.0);
     }
-    if (by_bsdf == (hit.triangle == MISS)) {
+    bool missed = hit.triangle == MISS;
+    if (!by_bsdf && !missed) {
         return vec3(0.0);
     }
-    if (by_bsdf) {
-        emitter = surface_at(hit.triangle, vec2(hit.u, hit.v));
+    bool punctual = PUNCTUAL_LIGHTS && !by_bsdf && is_punctual(question.kind);
+    vec3 direction = normalize(ray);
+    vec3 radiance;
+    float of_light = 0.0; // density per solid angle
+    if (punctual) {
+        radiance = question.irradiance;
+    } else if (ENVIRONMENT && (by_bsdf ? missed : question.kind == ENVIRONMENT_LIGHT)) {
+        Sky sky = question.sky;
+        if (by_bsdf) {
+            sky = environment_at(ray);
+        }
+        radiance = sky.radiance;
+        of_light = sky.density * light_at(settings.light_count - 1u).probability;
+    } else {
+        Surface emitter = question.emitter;
+        if (by_bsdf) {
+            if (missed) {
+                return vec3(0.0);
+            }
+            emitter = surface_at(hit.triangle, vec2(hit.u, hit.v));
+        }
+        if (emitter.light == NO_LIGHT) {
+            return vec3(0.0);
+        }
+        Light light = light_at(emitter.light);
+        Material material = material_at(emitter.material);
+        vec3 to_light = emitter.position - position;
+        float distance2 = dot(to_light, to_light);
+        direction = to_light * inversesqrt(max(distance2, 1e-37));
+        float cos_light = -dot(direction, emitter.geometric_normal);
+        if (!emits(material, cos_light > 0.0) || cos_light == 0.0) {
+            return vec3(0.0);
+        }
+        radiance = material.emission;
+        of_light = light.probability * distance2 / (light.area * abs(cos_light));
     }
-    if (emitter.light == NO_LIGHT) {
-        return vec3(0.0);
-    }
-    Light light = light_at(emitter.light);
-    Material material = material_at(emitter.material);
-    vec3 to_light = emitter.position - position;
-    float distance2 = dot(to_light, to_light);
-    vec3 direction = to_light * inversesqrt(max(distance2, 1e-37));
-    float cos_light = -dot(direction, emitter.geometric_normal);
     float cos_surface = dot(direction, shading_normal);
-    if (!emits(material, cos_light > 0.0) || cos_surface <= 0.0 || cos_light == 0.0) {
+    if (cos_surface <= 0.0) {
         return vec3(0.0);
     }
-    // Densities per solid angle.
-    float of_light = light.probability * distance2 / (light.area * abs(cos_light));
     float of_bsdf = cos_surface / PI;
     vec3 weight = visible_point.weight_normal.rgb;
     if (GLOSSY) {
@@ -111,7 +174,8 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
             of_bsdf = mix(of_bsdf, reflected_density(reflector.alpha, shading_normal, viewer, direction), reflections);
         }
     }
-    return weight * material.emission * (cos_surface / mix(of_light, of_bsdf, bsdf_sampling));
+    float density = punctual ? 1.0 - bsdf_sampling : mix(of_light, of_bsdf, bsdf_sampling);
+    return weight * radiance * (cos_surface / density);
 }
 
 void main() {

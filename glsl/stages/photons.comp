@@ -16,7 +16,9 @@ layout(local_size_x = 64) in;
 #include "intersect.glsl"
 #include "bsdf.glsl"
 #include "contact.glsl"
+#include "environment.glsl"
 #include "light.glsl"
+#include "emission.glsl"
 #include "photon.glsl"
 #include "status.glsl"
 
@@ -42,31 +44,20 @@ struct Path {
     uint ignored;
     uint medium; // material that it is in, or VACUUM
     bool seen_directly; // no specular bounce since the light: direct light, which `direct` samples
+    float inverse_range; // of the light, until the first surface
 };
 
-Path emit(inout Random random) {
-    // Place and direction are one point of four dimensions: what is left of the number that chose the light, with digits
-    // of another below it, is the first.
-    vec4 u = next4(random);
-    vec4 w = next4(random);
-    Choice choice = choose_light(u.x);
-    float rest = clamp((u.x - choice.before + w.x * (1.0 / 16777216.0)) / choice.width, 0.0, 1.0);
-    Light light = light_at(choice.light);
-    Surface emitter = surface_at(light.triangle, triangle_point(vec2(rest, u.y)));
-    Material material = material_at(emitter.material);
-    vec3 normal = emitter.geometric_normal;
-    if (material.double_sided != 0u && w.y < 0.5) {
-        normal = -normal;
-    }
+Path start(inout Random random) {
+    Emission emission = emit(random);
     Path path;
-    path.direction = cosine_direction(normal, u.zw);
-    path.origin = offset_origin(emitter.position, normal, emitter.reach);
-    float sides = material.double_sided != 0u ? 2.0 : 1.0;
-    path.flux = material.emission * (PI * sides * light.area / choice.width);
+    path.origin = emission.origin;
+    path.direction = emission.direction;
+    path.flux = emission.flux;
     path.depth = 0u;
-    path.ignored = light.triangle;
+    path.ignored = emission.ignored;
     path.medium = VACUUM;
     path.seen_directly = true;
+    path.inverse_range = emission.inverse_range;
     return path;
 }
 
@@ -102,7 +93,7 @@ void main() {
             }
             random = random_of_photon(push.first_path + next, push.iteration, push.block, push.first_of_block,
                                       settings.seed);
-            path = emit(random);
+            path = start(random);
             next += settings.photon_lanes;
             alive = true;
         }
@@ -121,10 +112,15 @@ void main() {
         Facing facing = met.facing;
         if (ABSORPTION) {
             path.flux *= transmittance(met.through, hit.t);
-            if (largest(path.flux) <= 0.0) {
-                alive = false;
-                continue;
-            }
+        }
+        if (PUNCTUAL_LIGHTS) {
+            // A range is how far the light itself reaches, not what it lights.
+            path.flux *= range_window(path.inverse_range, hit.t);
+            path.inverse_range = 0.0;
+        }
+        if (largest(path.flux) <= 0.0) {
+            alive = false;
+            continue;
         }
         vec4 u = next4(random);
         bool stores = choose_part(material, u.w) || is_matte(material) || is_glossy(material);

@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::contact::{Encounter, choose_part, transmittance};
+use super::environment::Environment;
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
 use super::intersect::{Ray, nearest_hit};
 use super::light::emits;
@@ -38,7 +39,10 @@ struct Branch {
 /// Radiance of the first surface on a ray's way, and whether nothing is there that scatters light.
 fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u32>) -> (DVec3, bool) {
     let Some(hit) = nearest_hit(inputs, ray, FAR, ignored) else {
-        return (DVec3::ZERO, true);
+        return (
+            Environment::of(&inputs.scene.environment).at(ray.direction).radiance,
+            true,
+        );
     };
     let met = Encounter::new(inputs, hit, ray.direction, medium);
     let material = met.surface.material;
@@ -174,6 +178,10 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
     while let Some(mut branch) = pending.pop() {
         slots[used] = loop {
             let Some(hit) = nearest_hit(inputs, branch.ray, FAR, branch.ignored) else {
+                if !branch.emission_seen {
+                    let sky = Environment::of(&inputs.scene.environment).at(branch.ray.direction);
+                    branch.emitted += branch.throughput * sky.radiance;
+                }
                 break nothing_seen(branch.emitted);
             };
             let incoming = branch.ray.direction;

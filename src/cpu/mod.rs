@@ -13,6 +13,8 @@ mod camera;
 mod contact;
 mod coverage;
 mod direct;
+mod emission;
+mod environment;
 mod gather;
 mod gloss;
 mod intersect;

@@ -1,17 +1,16 @@
 //! Photon tracing, and moving the photons together.
 
-use std::f64::consts::PI;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::contact::{Encounter, choose_part, transmittance};
+use super::emission::emit;
 use super::gloss::Reflector;
 use super::intersect::{Ray, nearest_hit};
-use super::light::{Choice, choose_light};
+use super::light::range_window;
 use super::random::Random;
-use super::sampling::{cosine_direction, encode_direction, triangle_point};
-use super::surface::{Boundary, GLOSSY, MATTE, MIRROR, offset_origin, surface_at};
+use super::sampling::{cosine_direction, encode_direction};
+use super::surface::{Boundary, GLOSSY, MATTE, MIRROR};
 use super::vector::{rgb, with_word};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
@@ -55,35 +54,8 @@ struct Path {
     medium: Option<u32>,
     /// No specular bounce since the light: direct light, which the stage `direct` samples.
     seen_directly: bool,
-}
-
-/// Starts a path on a light.
-fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Path {
-    let [choice, v, direction_u, direction_v] = random.next4();
-    let [digits, side, ..] = random.next4();
-    let Choice { light, before, width } = choose_light(&inputs.scene.lights, choice);
-    // What is left of the number that chose the light, with digits of another below it.
-    let rest = ((choice - before + digits / f64::from(1 << 24)) / width).clamp(0.0, 1.0);
-    let (u, v) = triangle_point(rest, v);
-    let emitter = surface_at(inputs.scene, light.triangle, u, v);
-    let back = emitter.material.double_sided != 0 && side < 0.5;
-    let normal = if back {
-        -emitter.geometric_normal
-    } else {
-        emitter.geometric_normal
-    };
-    let sides = if emitter.material.double_sided != 0 { 2.0 } else { 1.0 };
-    let flux = rgb(emitter.material.emission) * (PI * sides * f64::from(light.area) / width);
-    Path {
-        ray: Ray {
-            origin: offset_origin(emitter.position, normal, emitter.reach),
-            direction: cosine_direction(normal, direction_u, direction_v),
-        },
-        flux,
-        ignored: Some(light.triangle),
-        medium: None,
-        seen_directly: true,
-    }
+    /// Of the light, until the first surface.
+    inverse_range: f64,
 }
 
 /// Russian roulette that keeps the photons' powers alike: a photon survives with the ratio of the largest channels of
@@ -97,7 +69,15 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
     let settings = inputs.settings;
     let samples_lights = inputs.config.direct == Direct::Light;
     let mut random = Random::of_photon(inputs, path, iteration);
-    let mut path = emit(inputs, &mut random);
+    let emission = emit(inputs, &mut random);
+    let mut path = Path {
+        ray: emission.ray,
+        flux: emission.flux,
+        ignored: emission.ignored,
+        medium: None,
+        seen_directly: true,
+        inverse_range: emission.inverse_range,
+    };
     for _ in 0..settings.max_depth {
         let Some(hit) = nearest_hit(inputs, path.ray, FAR, path.ignored) else {
             return;
@@ -107,6 +87,8 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         let (surface, facing) = (met.surface, met.facing);
         let material = surface.material;
         path.flux *= transmittance(inputs, met.through, hit.t);
+        // A range is how far the light itself reaches, not what it lights.
+        path.flux *= range_window(path.inverse_range, hit.t);
         if path.flux.max_element() <= 0.0 {
             return;
         }
@@ -169,6 +151,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             ignored: Some(surface.triangle),
             medium,
             seen_directly: false,
+            inverse_range: 0.0,
         };
     }
     counts.add_truncated(1);

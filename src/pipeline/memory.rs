@@ -63,7 +63,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
 }
 
 /// The buffers that hold the scene.
-pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 6] {
+pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 7] {
     [
         (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
         (BufferId::HavelTriangles, bytemuck::cast_slice(&scene.havel_triangles)),
@@ -73,6 +73,7 @@ pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 6] {
         ),
         (BufferId::Materials, bytemuck::cast_slice(&scene.materials)),
         (BufferId::Lights, bytemuck::cast_slice(&scene.lights)),
+        (BufferId::Environment, bytemuck::cast_slice(&scene.environment)),
         (BufferId::ObjectGrids, bytemuck::cast_slice(&scene.object_grids)),
     ]
 }

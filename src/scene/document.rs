@@ -17,7 +17,8 @@ use super::{glb, meshopt};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 7] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 8] = [
+    "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",

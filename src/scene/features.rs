@@ -1,6 +1,8 @@
 //! What of the renderer a scene needs: the kernels are specialised for it and have no code for the rest.
 
-use crate::layout::{Material, ShadingTriangle, TOUCHED};
+use crate::layout::{
+    DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT, ShadingTriangle, TOUCHED,
+};
 
 /// [`Material::surface`] of a mirror.
 pub(super) const MIRROR: u32 = 1;
@@ -28,6 +30,10 @@ pub struct SceneFeatures {
     pub absorption: bool,
     /// Boundaries of dielectrics that lie on faces of other objects.
     pub contact: bool,
+    /// Lights that are points or directions.
+    pub punctual: bool,
+    /// An environment.
+    pub environment: bool,
 }
 
 impl SceneFeatures {
@@ -41,10 +47,12 @@ impl SceneFeatures {
         partly_clear: true,
         absorption: true,
         contact: true,
+        punctual: true,
+        environment: true,
     };
 
-    /// The features of what is seen: of materials that triangles have.
-    pub(super) fn of(triangles: &[ShadingTriangle], materials: &[Material]) -> Self {
+    /// The features of what is seen, of materials that triangles have, and of the lights.
+    pub(super) fn of(triangles: &[ShadingTriangle], materials: &[Material], lights: &[Light]) -> Self {
         let mut features = Self::default();
         for triangle in triangles {
             let material = &materials[triangle.material as usize];
@@ -59,11 +67,15 @@ impl SceneFeatures {
             features.absorption |= glass && material.absorption != [0.0; 3];
             features.contact |= triangle.flags & TOUCHED != 0;
         }
+        for light in lights {
+            features.punctual |= [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&light.kind);
+            features.environment |= light.kind == ENVIRONMENT_LIGHT;
+        }
         features
     }
 
     /// Each feature's constant in the kernels, and its value.
-    pub fn constants(self) -> [(&'static str, bool); 8] {
+    pub fn constants(self) -> [(&'static str, bool); 10] {
         [
             ("MIRRORS", self.mirror),
             ("DIELECTRICS", self.dielectric),
@@ -73,6 +85,8 @@ impl SceneFeatures {
             ("PARTLY_CLEAR", self.partly_clear),
             ("ABSORPTION", self.absorption),
             ("CONTACT", self.contact),
+            ("PUNCTUAL_LIGHTS", self.punctual),
+            ("ENVIRONMENT", self.environment),
         ]
     }
 

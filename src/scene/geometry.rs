@@ -129,6 +129,12 @@ pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut W
     }
     builder.complete_attributes();
     let geometry = builder.geometry;
+    if geometry.triangles.is_empty() {
+        return Err(
+            "no triangles: all of them are too narrow to have an area in the scene's size; nothing is left to render"
+                .into(),
+        );
+    }
     if !dropped.is_empty() {
         warnings.push(format!(
             "dropped {} triangles of zero area, in {}",

@@ -11,8 +11,6 @@ pub struct EmissiveTriangle {
     pub triangle: u32,
     /// Its area, in square render units.
     pub area: f64,
-    /// The same, twice that if both sides emit.
-    pub emitting_area: f64,
     /// Emitted power: mean of the RGB radiance × π × area, twice that if both sides emit. Always positive.
     pub power: f64,
 }
@@ -26,17 +24,16 @@ impl Scene {
             let material = &self.materials[object.material as usize];
             let radiance = material.emission.as_dvec3().element_sum() / 3.0;
             let sides = if material.double_sided { 2.0 } else { 1.0 };
-            (radiance > 0.0).then_some((object, radiance * PI, sides))
+            (radiance > 0.0).then_some((object, radiance * PI * sides))
         });
         emitting
-            .flat_map(|(object, exitance, sides)| {
+            .flat_map(|(object, exitance)| {
                 object.triangles.clone().map(move |triangle| {
                     let area = self.triangle_area(triangle);
                     EmissiveTriangle {
                         triangle,
                         area,
-                        emitting_area: sides * area,
-                        power: exitance * sides * area,
+                        power: exitance * area,
                     }
                 })
             })

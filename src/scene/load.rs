@@ -2,22 +2,24 @@
 
 use std::path::Path;
 
+use glam::Vec3;
+
 use super::animation::Pose;
 use super::diagnostic::{Check, Warnings, quote};
 use super::document::{Document, SUPPORTED_EXTENSIONS};
-use super::graph::{PlacedNode, place_nodes};
-use super::{Scene, Surface, camera, geometry, material};
+use super::graph::place_nodes;
+use super::punctual::punctual_lights;
+use super::{Environment, Scene, Surface, camera, geometry, material};
 use crate::error::{Error, Result};
 
-/// Not supported yet, but named in a warning of its own.
-const LIGHTS_EXTENSION: &str = "KHR_lights_punctual";
-
 /// What a scene is loaded with.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadOptions {
     /// The time that the file's animations are applied at, in seconds. `None`: nodes and morph targets are as the file
     /// has them at rest.
     pub frame_time: Option<f64>,
+    /// What surrounds the scene. `None`: nothing, or white light where the scene has no light at all, which is said.
+    pub environment: Option<Environment>,
 }
 
 impl Scene {
@@ -28,7 +30,7 @@ impl Scene {
     /// # Errors
     ///
     /// [`Error::Scene`], one line, if the file or one of its buffers can't be read or is damaged, if it requires an
-    /// extension that isn't supported, or if it shows no triangle or no light.
+    /// extension that isn't supported, or if it shows no triangle.
     pub fn load(path: &Path) -> Result<Self> {
         Self::load_with(path, LoadOptions::default())
     }
@@ -52,7 +54,7 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         None => Pose::default(),
     };
     let nodes = place_nodes(root, &pose)?;
-    warn_of_ignored(&document, &nodes, options, &mut warnings);
+    warn_of_ignored(&document, &options, &mut warnings);
 
     let instances = geometry::instances(&document, &nodes, &pose, &mut warnings)?;
     let geometry = geometry::assemble(root, &instances, &mut warnings)?;
@@ -82,6 +84,8 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         triangles: geometry.triangles,
         objects: geometry.objects,
         materials,
+        lights: punctual_lights(root, &nodes, geometry.normalisation, &mut warnings)?,
+        environment: options.environment,
         cameras,
         normalisation: geometry.normalisation,
         dropped_triangles: geometry.dropped_triangles,
@@ -91,32 +95,24 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         warnings.push("it has no perspective camera; one that is framed on its bounds is used".into());
         scene.cameras.push(camera::framed_on(scene.bounds()));
     }
-    if scene.emissive_triangles().is_empty() {
-        return Err(
-            "no light: no triangle has a material that emits; give one an emissiveFactor \
-             (KHR_lights_punctual lights aren't supported yet)"
-                .into(),
+    if scene.environment.is_none() && scene.lights.is_empty() && scene.emissive_triangles().is_empty() {
+        warnings.push(
+            "it has no light; it is rendered in an environment of radiance 1 (--environment sets another one)".into(),
         );
+        scene.environment = Some(Environment::constant(Vec3::ONE));
+    }
+    for warning in scene.environment.iter().flat_map(Environment::warnings) {
+        warnings.push(warning);
     }
     scene.warnings = warnings.into_lines();
     Ok(scene)
 }
 
 /// Warns of what applies to the file as a whole.
-fn warn_of_ignored(document: &Document, nodes: &[PlacedNode<'_>], options: LoadOptions, warnings: &mut Warnings) {
+fn warn_of_ignored(document: &Document, options: &LoadOptions, warnings: &mut Warnings) {
     let root = &document.root;
-    let has_light = |placed: &&PlacedNode<'_>| {
-        let extensions = placed.node.extensions.as_ref();
-        extensions.is_some_and(|extensions| extensions.others.contains_key(LIGHTS_EXTENSION))
-    };
-    let lights = nodes.iter().filter(has_light).count();
-    if lights > 0 {
-        warnings.push(format!(
-            "{LIGHTS_EXTENSION} isn't supported yet; {lights} lights are skipped"
-        ));
-    }
     for extension in &root.extensions_used {
-        if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) && extension != LIGHTS_EXTENSION {
+        if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) {
             warnings.push(format!(
                 "the extension {} isn't supported and is ignored",
                 quote(extension)

@@ -15,6 +15,7 @@ mod curve;
 mod diagnostic;
 mod document;
 mod elements;
+mod environment;
 mod facet;
 mod features;
 mod geometry;
@@ -22,6 +23,7 @@ mod glb;
 mod graph;
 mod instance;
 mod light;
+mod light_table;
 mod load;
 mod material;
 mod meshopt;
@@ -29,16 +31,21 @@ mod morph;
 pub mod object_grid;
 mod packed;
 mod primitive;
+mod punctual;
 mod skin;
 mod tangents;
 
 pub use features::SceneFeatures;
+#[cfg(test)]
+pub(crate) use light_table::set_alias_table;
 pub use load::LoadOptions;
 pub use packed::PackedScene;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
+pub use environment::Environment;
 pub use light::EmissiveTriangle;
+pub use punctual::{Emission, PunctualLight};
 
 /// The map from world space to render space: `render = (world − centre) · scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -191,6 +198,10 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Materials.
     pub materials: Vec<Material>,
+    /// Lights that are points or directions.
+    pub lights: Vec<PunctualLight>,
+    /// What shines from afar.
+    pub environment: Option<Environment>,
     /// Cameras; at least one.
     pub cameras: Vec<Camera>,
     /// How render space lies in world space.

@@ -4,9 +4,10 @@ use glam::{DVec3, Vec3};
 
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::object_grid::object_grids;
-use super::{Dielectric, Gloss, Scene, Surface, bvh, contact};
+use super::{Dielectric, Environment, Gloss, Scene, Surface, bvh, contact, environment, light_table};
 use crate::layout::{
-    BvhRecord, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, SMOOTH_SHADED, ShadingTriangle, TOUCHED,
+    BvhRecord, ENVIRONMENT_LIGHT, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, SMOOTH_SHADED, ShadingTriangle,
+    TOUCHED, TRIANGLE_LIGHT,
 };
 
 /// What the ray stages read, in the order of the BVH's leaves.
@@ -22,10 +23,12 @@ pub struct PackedScene {
     pub materials: Vec<Material>,
     /// What the kernels need to know.
     pub features: SceneFeatures,
-    /// Emissive triangles.
+    /// Lights.
     pub lights: Vec<Light>,
     /// What they emit together, mean of RGB.
     pub power: f64,
+    /// Radiance from afar, and how directions are chosen from it.
+    pub environment: Vec<[f32; 4]>,
     /// The paper's grid of each object.
     pub object_grids: Vec<ObjectGrid>,
     /// Cells of all of them.
@@ -51,12 +54,16 @@ impl PackedScene {
             .collect();
         let bvh = bvh::build(&corners)?;
         let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| corners[index as usize]).collect();
-        let lights = lights(scene, &bvh.order);
+        let (lights, power) = light_table::lights(scene, &bvh.order);
         let shaded = bvh.order.iter().zip(&corners);
         let mut shading_triangles: Vec<_> = shaded
             .map(|(&index, corners)| shading_triangle(scene, index, corners))
             .collect();
-        for (index, light) in lights.iter().enumerate() {
+        let emissive = lights
+            .iter()
+            .enumerate()
+            .filter(|(_, light)| light.kind == TRIANGLE_LIGHT);
+        for (index, light) in emissive {
             shading_triangles[light.triangle as usize].light = index as u32;
         }
         let materials: Vec<Material> = scene.materials.iter().map(material).collect();
@@ -66,8 +73,8 @@ impl PackedScene {
         }
         let (object_grids, object_cells) = object_grids(scene);
         Ok(Self {
-            power: scene.emissive_triangles().iter().map(|light| light.power).sum(),
-            features: SceneFeatures::of(&shading_triangles, &materials),
+            power,
+            features: SceneFeatures::of(&shading_triangles, &materials, &lights),
             object_grids,
             object_cells,
             havel_triangles: corners.iter().map(havel_triangle).collect(),
@@ -75,6 +82,10 @@ impl PackedScene {
             bsdf_sampling: bsdf_sampling(scene, &lights),
             materials,
             lights,
+            environment: scene
+                .environment
+                .as_ref()
+                .map_or_else(environment::no_table, Environment::table),
             bvh: bvh.records,
             order: bvh.order,
             scale: scene.normalisation.scale,
@@ -146,47 +157,23 @@ fn material(material: &super::Material) -> Material {
     }
 }
 
-/// The part of the scene's area that emits is about the chance that a direction of the BSDF meets a light. Never 0: it
+/// About the chance that a direction of the BSDF meets a light: the part of the scene's area that emits, or of all directions
+/// that the environment's light comes from, half of which lie below a surface. Never 0 where such a direction can meet one: it
 /// bounds the contribution of a light's point next to the surface.
 fn bsdf_sampling(scene: &Scene, lights: &[Light]) -> f32 {
+    let of_kind = |kind: u32| lights.iter().filter(move |light| light.kind == kind);
+    let from_afar: f64 = of_kind(ENVIRONMENT_LIGHT)
+        .zip(&scene.environment)
+        .map(|(light, environment)| f64::from(light.probability) * environment.spread())
+        .sum();
+    let emissive: f64 = of_kind(TRIANGLE_LIGHT).map(|light| f64::from(light.area)).sum();
+    if emissive == 0.0 && scene.environment.is_none() {
+        return 0.0;
+    }
     let all: f64 = (0..scene.triangles.len() as u32)
         .map(|triangle| scene.triangle_area(triangle))
         .sum();
-    let emissive: f64 = lights.iter().map(|light| f64::from(light.area)).sum();
-    ((emissive / all) as f32).clamp(0.05, 0.5)
-}
-
-/// The part of all choices of a light that goes by emitting area instead of flux. A light that is a million million times
-/// dimmer than another one would never have its turn, and where it shines alone nothing would be seen. Where all lights
-/// have one radiance, both are the same.
-const BY_AREA: f64 = 0.1;
-
-/// Emissive triangles in leaf order, with probabilities in proportion to their flux, nearly.
-fn lights(scene: &Scene, order: &[u32]) -> Vec<Light> {
-    let mut place = vec![0; order.len()];
-    for (packed, &index) in order.iter().enumerate() {
-        place[index as usize] = packed as u32;
-    }
-    let mut emissive = scene.emissive_triangles();
-    emissive.sort_by_key(|light| place[light.triangle as usize]);
-    let power: f64 = emissive.iter().map(|light| light.power).sum();
-    let area: f64 = emissive.iter().map(|light| light.emitting_area).sum();
-    let mut before = 0.0;
-    let count = emissive.len();
-    emissive
-        .iter()
-        .enumerate()
-        .map(|(i, light)| {
-            let probability = (1.0 - BY_AREA) * light.power / power + BY_AREA * light.emitting_area / area;
-            before += probability;
-            Light {
-                triangle: place[light.triangle as usize],
-                cumulative: if i + 1 == count { 1.0 } else { before as f32 },
-                probability: probability as f32,
-                area: light.area as f32,
-            }
-        })
-        .collect()
+    ((emissive / all + 0.5 * from_afar) as f32).clamp(0.05, 0.5)
 }
 
 /// Unit vector to two 16-bit numbers, as `glsl/shared/sampling.glsl` has it.

@@ -2,23 +2,63 @@
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
+use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
 use ppm_vk::layout::{NO_OBJECT, Photon, Settings, VisiblePoint};
 use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::scene::{Emission, Environment, PackedScene, PunctualLight, Scene};
 use ppm_vk::stage::BufferId;
 
-/// A scene of `scenes/`.
+/// What the names of scenes end in that have a light of every kind more than their file.
+const LIT: &str = ", lit";
+
+/// A scene of `scenes/`; with lights of every kind if the name ends in [`LIT`].
 pub fn scene(name: &str) -> Scene {
+    if let Some(name) = name.strip_suffix(LIT) {
+        let mut scene = scene(name);
+        add_lights(&mut scene);
+        return scene;
+    }
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("scenes")
         .join(name)
         .with_extension("gltf");
     Scene::load(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Adds punctual lights, and an environment in which each direction has its own radiance.
+fn add_lights(scene: &mut Scene) {
+    let light = |emission, position: Vec3, range| PunctualLight {
+        emission,
+        position,
+        intensity: Vec3::new(1.0, 0.8, 0.5),
+        range,
+    };
+    let direction = Vec3::new(0.2, -1.0, -0.7).normalize();
+    let spot = Emission::Spot {
+        direction,
+        inner: 0.02,
+        outer: 0.2,
+    };
+    scene.lights = vec![
+        light(Emission::Point, Vec3::new(0.3, 0.5, 0.2), None),
+        light(Emission::Point, Vec3::new(-0.4, 0.6, 0.4), Some(1.5)),
+        light(spot, Vec3::new(-0.1, 0.8, 0.6), Some(4.0)),
+        light(Emission::Directional { direction }, Vec3::ZERO, None),
+    ];
+    let pixel = |i: usize| {
+        [
+            0.2 + (i % 5) as f32,
+            if i == 100 { 200.0 } else { 0.5 },
+            (i / 32) as f32 * 0.2,
+        ]
+    };
+    let image = Image::new(32, 16, (0..512).map(pixel).collect());
+    scene.environment = Some(Environment::new(image).expect("an environment"));
 }
 
 /// A scene in the device's layout.

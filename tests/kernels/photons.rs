@@ -108,6 +108,14 @@ fn photons_that_microfacets_scatter_land_where_the_cpus_do() {
 }
 
 #[test]
+fn photons_of_every_kind_of_light_land_where_the_cpus_do() {
+    for name in ["cornell-spheres, lit", "ring, lit", "glasses, lit"] {
+        // Many of the environment's meet nothing.
+        assert_photons_agree(name, photons_carry_all_light(), 1e-4, 0.99, 1500);
+    }
+}
+
+#[test]
 fn photons_of_indirect_light_leave_out_the_first_matte_surface() {
     assert_photons_agree("cornell-spheres", small(), 1e-4, 0.995, 4000);
 }

@@ -5,6 +5,7 @@
 //! bounce. Where a ray passes an edge, or a random number lies next to a reflectance, rounding makes it take another
 //! way: those are the few that may differ.
 
+use bytemuck::Zeroable;
 use ppm_vk::config::{Direct, Estimator, RenderConfig, Sampler};
 use ppm_vk::cpu::{self, Counts, Seen};
 use ppm_vk::layout::{DirectSum, Gloss, Light};
@@ -69,7 +70,14 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize) {
 
 #[test]
 fn camera_paths_end_where_the_cpus_end() {
-    for name in ["cornell-spheres", "ring", "glossy", "glasses"] {
+    for name in [
+        "cornell-spheres",
+        "ring",
+        "glossy",
+        "glasses",
+        "ring, lit",
+        "glasses, lit",
+    ] {
         assert_camera_agrees(name, small(), 3000);
     }
 }
@@ -105,6 +113,8 @@ fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
         ("SAMPLE_LIGHTS", u32::from(bench.config.direct == Direct::Light)),
         ("SAMPLER", bench.config.sampler as u32),
         ("GLOSSY", u32::from(bench.scene.features.glossy)),
+        ("PUNCTUAL_LIGHTS", u32::from(bench.scene.features.punctual)),
+        ("ENVIRONMENT", u32::from(bench.scene.features.environment)),
     ];
     recording.dispatch(
         StageDesc::new(&shaders::DIRECT, slots)
@@ -147,6 +157,8 @@ fn direct_light_agrees_at_the_same_visible_points() {
         ("ring", 2000),
         ("furnace-closed", 4000),
         ("glossy", 2500),
+        ("ring, lit", 2000),
+        ("glossy, lit", 1000),
     ] {
         let mut bench = Bench::new(name, small());
         // Light that grazes a surface has a cosine of which rounding is a larger part.
@@ -172,34 +184,35 @@ fn random_numbers_are_the_same_to_the_last_bit() {
 }
 
 fn assert_same_random_numbers(sampler: Sampler) {
-    // Each visible point chooses a light by its number u. With the lights' cumulative probabilities at u and at the
-    // next number above, one bit more or less chooses another light; the radiance, in proportion to the light's area,
-    // tells which one it was. The emitter is the same triangle for all.
+    // Each visible point chooses a light by its numbers. There are many more cells of lights than points, each of which
+    // ends right below or right above what of its point's number lies in it: 12 digits more or less below the first 24 choose
+    // another light; the radiance, in proportion to the light's area, tells which one it was. The emitter is the same
+    // triangle for all.
+    const CELLS: u32 = 1 << 16;
+    const MARGIN: f64 = 1.0 / (1 << 20) as f64;
     let mut bench = Bench::new("light-area", RenderConfig { sampler, ..small() });
-    let points = bench.settings.resolution[0] * bench.settings.resolution[1];
-    let step = 1.0 / f64::from(1 << 24);
-    let mut thresholds: Vec<f64> = (0..points)
-        .map(|slot| cpu::Random::of_pixel(&bench.inputs(), cpu::PathKind::LightSample, slot, 0).next4()[0])
-        .flat_map(|u| [u, u + step])
-        .chain([1.0])
-        .collect();
-    thresholds.sort_by(f64::total_cmp);
-    thresholds.dedup();
-    let lights: Vec<Light> = thresholds
-        .iter()
-        .enumerate()
-        .map(|(i, &cumulative)| Light {
-            triangle: bench.scene.lights[0].triangle,
-            cumulative: cumulative as f32,
-            probability: 1.0,
-            area: 1.0 + i as f32,
-        })
-        .collect();
-    bench.settings.light_count = lights.len() as u32;
+    let light = |area| Light {
+        triangle: bench.scene.lights[0].triangle,
+        probability: 1.0,
+        area,
+        accept: 1.0,
+        alias: CELLS - 1,
+        ..Light::zeroed()
+    };
+    let mut lights = vec![light(1.0); CELLS as usize];
+    for slot in 0..bench.settings.resolution[0] * bench.settings.resolution[1] {
+        let mut random = cpu::Random::of_pixel(&bench.inputs(), cpu::PathKind::LightSample, slot, 0);
+        let [u, ..] = random.next4();
+        let [digits, ..] = random.next4();
+        let place = (u + digits / f64::from(1 << 24)) * f64::from(CELLS);
+        let side = if slot % 2 == 0 { MARGIN } else { -MARGIN };
+        lights[place as usize].accept = (place.fract() + side).clamp(1e-9, 1.0) as f32;
+    }
+    lights[CELLS as usize - 1] = light(2.0);
+    bench.settings.light_count = CELLS;
     let settings = bench.settings;
     bench.upload(BufferId::Settings, &[settings]);
     bench.upload(BufferId::Lights, &lights);
-    // Two neighbouring lights of 8,193 differ by 1.2e-4 of their area at the least.
     bench.scene.lights = lights;
     compare_direct(&mut bench, 6e-5).assert(&format!("choices that hang on the last bit, {sampler:?}"), 0.999, 500);
 }

@@ -7,7 +7,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 use ppm_vk::error::{Error, Result};
-use ppm_vk::scene::{LoadOptions, Scene};
+use ppm_vk::scene::{Environment, LoadOptions, Scene};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -199,7 +199,10 @@ impl Fixture {
     /// Writes a file into the folder and loads it as a scene at a time.
     pub fn load_bytes_at(&self, name: &str, bytes: &[u8], time: f64) -> Result<Scene> {
         self.write(name, bytes);
-        let options = LoadOptions { frame_time: Some(time) };
+        let options = LoadOptions {
+            frame_time: Some(time),
+            ..LoadOptions::default()
+        };
         Scene::load_with(&self.path(name), options)
     }
 
@@ -239,6 +242,17 @@ impl Fixture {
             "/animations/0/channels/-",
             json!({"sampler": sampler, "target": {"node": node, "path": path}}),
         )
+    }
+
+    /// The same, with an environment around it.
+    pub fn load_under(&self, environment: Environment) -> Result<Scene> {
+        self.write("room.bin", &self.binary);
+        self.write("room.gltf", self.json.to_string().as_bytes());
+        let options = LoadOptions {
+            environment: Some(environment),
+            ..LoadOptions::default()
+        };
+        Scene::load_with(&self.path("room.gltf"), options)
     }
 
     /// Loads it as a `.gltf` file with the buffer in a data URI.

@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
-use ppm_vk::scene::EmissiveTriangle;
-use serde_json::json;
+use glam::Vec3;
+use ppm_vk::scene::{Emission, EmissiveTriangle, Environment, PackedScene};
+use serde_json::{Value, json};
 
 use crate::fixture::Fixture;
 
@@ -18,12 +19,10 @@ fn power_is_mean_radiance_times_pi_times_area_and_sides() {
     let mut wanted = EmissiveTriangle {
         triangle: 2,
         area: 0.5,
-        emitting_area: 0.5,
         power: 4.0 * PI * 0.5,
     };
     assert_eq!(room.scene().emissive_triangles(), [wanted]);
     room.set("/materials/1/doubleSided", json!(true));
-    wanted.emitting_area *= 2.0;
     wanted.power *= 2.0;
     assert_eq!(room.scene().emissive_triangles(), [wanted]);
 }
@@ -44,35 +43,148 @@ fn every_instance_of_a_light_emits() {
 }
 
 #[test]
-fn a_scene_without_light_is_refused() {
-    let mut room = Fixture::room();
-    room.set("/materials/1/emissiveFactor", json!([0, 0, 0]));
-    room.assert_fails(&["no light", "emissiveFactor"]);
-
-    let mut room = Fixture::room();
-    room.set("/scenes/0/nodes", json!([0, 2]));
-    room.assert_fails(&["no light"]);
-
-    let mut room = Fixture::room();
-    room.set(
+fn a_scene_without_light_is_lit_by_radiance_1_from_all_around_and_says_so() {
+    let mut unlit = Fixture::room();
+    unlit.set("/materials/1/emissiveFactor", json!([0, 0, 0]));
+    let mut without_lamp = Fixture::room();
+    without_lamp.set("/scenes/0/nodes", json!([0, 2]));
+    let mut turned_off = Fixture::room();
+    turned_off.set(
         "/materials/1/extensions/KHR_materials_emissive_strength",
         json!({"emissiveStrength": 0}),
     );
-    room.assert_fails(&["no light"]);
+    for room in [&mut unlit, &mut without_lamp, &mut turned_off] {
+        let scene = room.assert_warns(&["no light", "--environment"]);
+        assert_eq!(scene.environment, Some(Environment::constant(Vec3::ONE)));
+    }
+    let dim = Environment::constant(Vec3::splat(0.1));
+    let scene = unlit.load_under(dim.clone()).expect("a scene");
+    assert_eq!((scene.environment, scene.warnings), (Some(dim), vec![]));
+    assert_eq!(Fixture::room().scene().environment, None);
+}
+
+/// The room with lights of KHR_lights_punctual, each at a node of its own (3, 4, …).
+fn room_with(lights: &[Value]) -> Fixture {
+    let mut room = Fixture::room();
+    room.set("/extensionsUsed", json!(["KHR_lights_punctual"]));
+    room.set("/extensionsRequired", json!(["KHR_lights_punctual"]));
+    room.set("/extensions", json!({"KHR_lights_punctual": {"lights": lights}}));
+    for light in 0..lights.len() {
+        room.add_root(json!({"translation": [0, 2, 0], "extensions": {"KHR_lights_punctual": {"light": light}}}));
+    }
+    room
 }
 
 #[test]
-fn punctual_lights_are_skipped_with_a_warning() {
-    let mut room = Fixture::room();
-    room.set("/extensionsUsed", json!(["KHR_lights_punctual"]));
-    room.set(
-        "/extensions",
-        json!({"KHR_lights_punctual": {"lights": [{"type": "point"}, {"type": "spot", "spot": {}}]}}),
-    );
-    for light in 0..2 {
-        room.add_root(json!({"extensions": {"KHR_lights_punctual": {"light": light}}}));
+fn punctual_lights_stand_where_their_nodes_are_and_shine_along_minus_z() {
+    let mut room = room_with(&[
+        json!({"type": "point", "color": [1, 0.5, 0.25], "intensity": 8, "range": 3}),
+        json!({"type": "spot", "intensity": 2, "spot": {"innerConeAngle": 0.5, "outerConeAngle": 1.0}}),
+        json!({"type": "directional", "intensity": 5, "range": 3}),
+        json!({"type": "spot"}),
+        json!({"type": "point", "intensity": 0}),
+    ]);
+    // Straight down; a node's scale is no part of an intensity.
+    let half = 0.5_f64.sqrt();
+    for node in [4, 5] {
+        room.set(&format!("/nodes/{node}/rotation"), json!([-half, 0, 0, half]));
     }
-    room.assert_warns(&["KHR_lights_punctual", "2 lights are skipped"]);
-    room.set("/extensionsRequired", json!(["KHR_lights_punctual"]));
-    room.assert_fails(&["requires the extension \"KHR_lights_punctual\""]);
+    room.set("/nodes/3/scale", json!([7, 7, 7]));
+    let scene = room.scene();
+    let [point, spot, sun, default_spot] = scene.lights[..] else {
+        panic!("{:?}", scene.lights);
+    };
+    // The bounds of what has triangles are centred half a unit up, and scaled by 1.
+    let place = Vec3::new(0.0, 1.5, 0.0);
+    assert_eq!(point.emission, Emission::Point);
+    assert_eq!((point.position, point.intensity), (place, Vec3::new(8.0, 4.0, 2.0)));
+    assert_eq!((point.range, spot.range, sun.range), (Some(3.0), None, None));
+    let Emission::Spot {
+        direction,
+        inner,
+        outer,
+    } = spot.emission
+    else {
+        panic!("{spot:?}");
+    };
+    assert!(direction.distance(Vec3::NEG_Y) < 1e-6 && spot.position == place);
+    assert!((inner - (1.0 - 0.5_f64.cos())).abs() < 1e-7 && (outer - (1.0 - 1_f64.cos())).abs() < 1e-7);
+    let Emission::Directional { direction } = sun.emission else {
+        panic!("{sun:?}");
+    };
+    assert!(direction.distance(Vec3::NEG_Y) < 1e-6 && sun.intensity == Vec3::splat(5.0));
+    let Emission::Spot { inner, outer, .. } = default_spot.emission else {
+        panic!("{default_spot:?}");
+    };
+    assert!(inner == 0.0 && (outer - (1.0 - (PI / 4.0).cos())).abs() < 1e-7);
+}
+
+/// Irradiance stays as it is when lengths are scaled: so intensities scale with their squares.
+#[test]
+fn intensities_and_ranges_are_in_render_units() {
+    let mut room = room_with(&[
+        json!({"type": "point", "intensity": 8, "range": 3}),
+        json!({"type": "directional", "intensity": 5}),
+    ]);
+    room.add_parent(json!({"scale": [10, 10, 10]}));
+    let scene = room.scene();
+    let [point, sun] = scene.lights[..] else {
+        panic!("{:?}", scene.lights);
+    };
+    assert!((point.intensity.x - 0.08).abs() < 1e-8 && (sun.intensity.x - 5.0).abs() < 1e-8);
+    assert!((point.range.expect("a range") - 0.3).abs() < 1e-8);
+}
+
+#[test]
+fn damaged_punctual_lights_are_named() {
+    for (light, parts) in [
+        (json!({"type": "lamp"}), &["light 0", "type"][..]),
+        (
+            json!({"type": "point", "name": "sun", "intensity": -1}),
+            &["light 0 \"sun\"", "intensity"],
+        ),
+        (json!({"type": "point", "color": [-1, 0, 0]}), &["light 0", "color"]),
+        (json!({"type": "point", "range": 0}), &["light 0", "range"]),
+        (
+            json!({"type": "spot", "spot": {"innerConeAngle": 1, "outerConeAngle": 0.5}}),
+            &["light 0", "innerConeAngle"],
+        ),
+        (
+            json!({"type": "spot", "spot": {"outerConeAngle": 2}}),
+            &["light 0", "outerConeAngle"],
+        ),
+    ] {
+        room_with(&[light]).assert_fails(parts);
+    }
+    let mut room = room_with(&[json!({"type": "point"})]);
+    room.set("/nodes/3/extensions/KHR_lights_punctual/light", json!(9));
+    room.assert_fails(&["node 3", "no light 9", "the file has 1"]);
+    let mut room = room_with(&[json!({"type": "directional"})]);
+    room.remove("/nodes/3/translation");
+    room.set(
+        "/nodes/3/matrix",
+        json!([0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1]),
+    );
+    room.assert_warns(&["light 0", "direction", "skipped"]);
+}
+
+/// Lights too dim or small to be chosen by their flux have their turn: the chances of all of them sum up to 1.
+#[test]
+fn every_light_has_a_share_of_the_choices() {
+    let mut room = room_with(&[
+        json!({"type": "point", "intensity": 1e-12}),
+        json!({"type": "directional", "intensity": 1e6}),
+    ]);
+    room.add_root(json!({"mesh": 1, "translation": [0, 0.5, 0], "scale": [1e-6, 1e-6, 1e-6]}));
+    let scene = room.load_under(Environment::constant(Vec3::ONE)).expect("a scene");
+    let packed = PackedScene::new(&scene).expect("a hierarchy");
+    assert_eq!(packed.lights.len(), 5);
+    // A tenth of the choices goes to the two lamps, the two punctual lights and the environment alike.
+    assert!(
+        packed.lights.iter().all(|light| light.probability >= 0.1 / 5.0),
+        "{:?}",
+        packed.lights
+    );
+    let sum: f64 = packed.lights.iter().map(|light| f64::from(light.probability)).sum();
+    assert!((sum - 1.0).abs() < 1e-6, "{sum}");
 }

@@ -1,0 +1,290 @@
+//! What shines from afar: a picture of the sphere of directions, or one radiance.
+//!
+//! Pictures are equirectangular as in the Khronos glTF sample viewer: the upper edge is +Y, the centre +Z, and −X lies to
+//! the right of it. Between the centres of pixels radiance is interpolated.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use crate::error::{Error, Result};
+use crate::film::{Image, read_exr, read_hdr};
+
+/// Pixels that a picture is reduced to: as many as one buffer of every device holds.
+const MAX_PIXELS: usize = 1 << 22;
+
+/// The part of all choices of a direction that goes by solid angle alone, so that what is dim has its turn.
+const UNIFORM: f64 = 0.1;
+
+/// Radiance from each direction, never black all over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Environment {
+    image: Image,
+    /// Size of the picture that it was reduced from.
+    reduced_from: Option<[usize; 2]>,
+    /// Values that were negative or not finite.
+    replaced: usize,
+}
+
+impl Environment {
+    /// The same radiance from everywhere.
+    pub fn constant(radiance: Vec3) -> Self {
+        Self {
+            image: Image::new(1, 1, vec![radiance.to_array()]),
+            reduced_from: None,
+            replaced: 0,
+        }
+    }
+
+    /// Reads an OpenEXR or Radiance picture, by the name's end.
+    ///
+    /// # Errors
+    /// A file that can't be read, whose name ends in neither `.exr` nor `.hdr`, or that is black.
+    pub fn read(path: &Path) -> Result<Self> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let image = match extension.to_str() {
+            Some("exr") => read_exr(path)?,
+            Some("hdr") => read_hdr(path)?,
+            _ => {
+                return Err(Error::file(
+                    path,
+                    "is no environment: the name of a picture ends in .exr or .hdr, and a radiance is three numbers, such as 1,1,1",
+                ));
+            }
+        };
+        Self::new(image).map_err(|what| Error::file(path, what))
+    }
+
+    /// From an equirectangular picture. Values that are negative or not finite are taken for 0 and counted.
+    ///
+    /// # Errors
+    /// A text, if nothing is above 0.
+    pub fn new(image: Image) -> std::result::Result<Self, String> {
+        let values = || image.pixels().iter().flatten();
+        let is_bad = |value: f32| !(value.is_finite() && value >= 0.0);
+        if !values().any(|&value| value > 0.0 && value.is_finite()) {
+            return Err("is black, so that no light comes from it; choose another one".into());
+        }
+        let replaced = values().filter(|value| is_bad(**value)).count();
+        let size = [image.width(), image.height()];
+        let factor = (1..)
+            .find(|factor| (size[0] / factor).max(1) * (size[1] / factor).max(1) <= MAX_PIXELS)
+            .unwrap_or(1);
+        Ok(Self {
+            image: reduce(&image, size.map(|side| (side / factor).max(1))),
+            reduced_from: (factor > 1).then_some(size),
+            replaced,
+        })
+    }
+
+    /// What was done to the picture to have it rendered, one line each.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.replaced > 0 {
+            warnings.push(format!(
+                "{} values of the environment are negative, infinite or NaN, and are taken for 0",
+                self.replaced
+            ));
+        }
+        if let Some([width, height]) = self.reduced_from {
+            let [to_width, to_height] = self.size();
+            warnings.push(format!(
+                "the environment of {width}x{height} pixels is larger than what devices hold, and is reduced to \
+                 {to_width}x{to_height}"
+            ));
+        }
+        warnings
+    }
+
+    /// Pixels, width and height; 1 × 1 where there is one radiance.
+    pub fn size(&self) -> [usize; 2] {
+        [self.image.width(), self.image.height()]
+    }
+
+    /// Mean of the RGB radiance, integrated over all directions.
+    pub(super) fn total(&self) -> f64 {
+        let weights = self.weights();
+        let rows = weights.chunks(self.image.width()).enumerate();
+        rows.map(|(row, weights)| weights.iter().sum::<f64>() * self.solid_angle(row))
+            .sum()
+    }
+
+    /// About the part of all directions that the light comes from: 1 where it comes from all alike.
+    pub(super) fn spread(&self) -> f64 {
+        let weights = self.weights();
+        let rows = weights.chunks(self.image.width()).enumerate();
+        let squares: f64 = rows
+            .map(|(row, weights)| weights.iter().map(|weight| weight * weight).sum::<f64>() * self.solid_angle(row))
+            .sum();
+        self.total().powi(2) / (4.0 * PI * squares)
+    }
+
+    /// The picture with the probabilities by which directions are chosen, as `glsl/shared/environment.glsl` reads it: the
+    /// size; of each row the cosines at its upper and lower edge; the pixels. w: of rows and of a row's pixels, the
+    /// probability of each and those before it.
+    pub(crate) fn table(&self) -> Vec<[f32; 4]> {
+        let [width, height] = self.size();
+        let weights = self.weights();
+        let mean = self.total() / (4.0 * PI);
+        let density = |weight: f64| (1.0 - UNIFORM) * weight + UNIFORM * mean;
+        let rows: Vec<Vec<f32>> = weights
+            .chunks(width)
+            .map(|weights| cumulative(&weights.iter().map(|&weight| density(weight)).collect::<Vec<_>>()))
+            .collect();
+        let of_rows = weights.chunks(width).enumerate().map(|(row, weights)| {
+            let sum: f64 = weights.iter().map(|&weight| density(weight)).sum();
+            sum * self.solid_angle(row)
+        });
+        let edge = |row: usize| (PI * row as f64 / height as f64).cos() as f32;
+        let mut table = vec![[f32::from_bits(width as u32), f32::from_bits(height as u32), 0.0, 0.0]];
+        let sums = cumulative(&of_rows.collect::<Vec<_>>());
+        table.extend(
+            sums.iter()
+                .enumerate()
+                .map(|(row, &sum)| [edge(row), edge(row + 1), 0.0, sum]),
+        );
+        let pixels = self.image.pixels().iter().zip(rows.iter().flatten());
+        table.extend(pixels.map(|(&[r, g, b], &sum)| [r, g, b, sum]));
+        table
+    }
+
+    /// Solid angle of a pixel of a row.
+    fn solid_angle(&self, row: usize) -> f64 {
+        let [width, height] = self.size();
+        let edge = |row: usize| (PI * row as f64 / height as f64).cos();
+        2.0 * PI / width as f64 * (edge(row) - edge(row + 1))
+    }
+
+    /// Mean over each pixel of the interpolated radiance, itself the mean of RGB: of a pixel and its neighbours in a row and
+    /// a column, 1/8, 6/8 and 1/8.
+    fn weights(&self) -> Vec<f64> {
+        let [width, height] = self.size();
+        let pixels = self.image.pixels();
+        let mean = |x: usize, y: usize| DVec3::from(pixels[y * width + x].map(f64::from)).element_sum() / 3.0;
+        let blend = |before: f64, at: f64, after: f64| 0.125 * before + 0.75 * at + 0.125 * after;
+        let in_row = |x: usize, y: usize| blend(mean((x + width - 1) % width, y), mean(x, y), mean((x + 1) % width, y));
+        let all = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        all.map(|(x, y)| {
+            blend(
+                in_row(x, y.saturating_sub(1)),
+                in_row(x, y),
+                in_row(x, (y + 1).min(height - 1)),
+            )
+        })
+        .collect()
+    }
+}
+
+/// A table of no light, for scenes without an environment.
+pub(super) fn no_table() -> Vec<[f32; 4]> {
+    vec![
+        [f32::from_bits(1), f32::from_bits(1), 0.0, 0.0],
+        [1.0, -1.0, 0.0, 1.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+}
+
+/// Parts of the sum up to and with each value, in multiples of 2⁻²⁴, as random numbers are. Each value has one of them at
+/// the least, so that none is left out: what is chosen more often than it should be counts less in return.
+fn cumulative(values: &[f64]) -> Vec<f32> {
+    const STEPS: f64 = (1 << 24) as f64;
+    let total: f64 = values.iter().sum();
+    let mut sum = 0.0;
+    let mut before = 0.0;
+    let sums = values.iter().zip((0..values.len()).rev()).map(|(value, after)| {
+        sum += value;
+        before = (sum / total * STEPS)
+            .round()
+            .max(before + 1.0)
+            .min(STEPS - after as f64);
+        (before / STEPS) as f32
+    });
+    sums.collect()
+}
+
+/// The picture with fewer pixels, each the mean of what it stands for; values that are no radiance are 0.
+fn reduce(image: &Image, [width, height]: [usize; 2]) -> Image {
+    let part = |i: usize, from: usize, to: usize| i * from / to..(i + 1) * from / to;
+    let mut pixels = Vec::with_capacity(width * height);
+    for y in 0..height {
+        for x in 0..width {
+            let rows = part(y, image.height(), height);
+            let columns = part(x, image.width(), width);
+            let count = (rows.len() * columns.len()) as f64;
+            let sum: DVec3 = rows
+                .flat_map(|row| &image.pixels()[row * image.width()..][columns.clone()])
+                .map(|pixel| {
+                    DVec3::from(pixel.map(|value| f64::from(if value.is_finite() { value.max(0.0) } else { 0.0 })))
+                })
+                .sum();
+            pixels.push((sum / count).as_vec3().to_array());
+        }
+    }
+    Image::new(width, height, pixels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_radiance_comes_from_the_whole_sphere() {
+        let environment = Environment::constant(Vec3::new(1.0, 2.0, 6.0));
+        assert!((environment.total() - 12.0 * PI).abs() < 1e-12);
+        assert!((environment.spread() - 1.0).abs() < 1e-12);
+        let [_, row, pixel] = environment.table()[..] else {
+            panic!("a header, a row and a pixel");
+        };
+        assert_eq!(row, [1.0, -1.0, 0.0, 1.0]);
+        assert_eq!(pixel, [1.0, 2.0, 6.0, 1.0]);
+    }
+
+    #[test]
+    fn large_pictures_are_reduced_and_keep_their_light() {
+        let (width, height) = (4097, 2050);
+        let pixel = |i: usize| [(i % 7) as f32, -1.0, 1.0];
+        let large = Image::new(width, height, (0..width * height).map(pixel).collect());
+        let environment = Environment::new(large).expect("an environment");
+        assert_eq!(environment.size(), [2048, 1025]);
+        let warnings = environment.warnings();
+        assert!(
+            warnings[0].starts_with("8398850 values") && warnings[1].contains("4097x2050"),
+            "{warnings:?}"
+        );
+        // The mean of 0 to 6, none for the negative values, and 1.
+        let mean = environment.total() / (4.0 * PI);
+        assert!((mean - 4.0 / 3.0).abs() < 1e-3, "{mean}");
+    }
+
+    #[test]
+    fn black_pictures_are_refused() {
+        for value in [0.0, -1.0, f32::INFINITY, f32::NAN] {
+            let error = Environment::new(Image::new(1, 1, vec![[value; 3]])).expect_err("no environment");
+            assert!(error.contains("black"), "{error}");
+        }
+    }
+
+    #[test]
+    fn values_that_are_no_radiance_are_counted_and_taken_for_0() {
+        let pixels = vec![[f32::NAN, 1.0, -2.0], [1.0, f32::INFINITY, f32::NEG_INFINITY]];
+        let environment = Environment::new(Image::new(2, 1, pixels)).expect("an environment");
+        assert_eq!(environment.image.pixels(), [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]);
+        assert!(
+            environment.warnings()[0].starts_with("4 values"),
+            "{:?}",
+            environment.warnings()
+        );
+        assert!(environment.table().iter().flatten().all(|value| value.is_finite()));
+    }
+
+    #[test]
+    fn every_pixel_can_be_chosen() {
+        let mut values = vec![1e-30; 5000];
+        values[0] = 1.0;
+        values[2500] = 1.0;
+        let sums = cumulative(&values);
+        assert_eq!(sums.last(), Some(&1.0));
+        assert!(sums.windows(2).all(|pair| pair[0] < pair[1]));
+    }
+}
