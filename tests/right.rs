@@ -21,6 +21,8 @@ mod glass;
 mod gloss;
 #[path = "right/lamp.rs"]
 mod lamp;
+#[path = "right/lights.rs"]
+mod lights;
 #[path = "right/measure.rs"]
 mod measure;
 #[path = "../examples/make_scenes/scenes/mesh.rs"]

@@ -41,7 +41,10 @@ impl Subject {
     }
 
     pub fn at(path: &Path) -> Self {
-        let scene = Scene::load(path).unwrap_or_else(|error| panic!("{error}"));
+        Self::of(Scene::load(path).unwrap_or_else(|error| panic!("{error}")))
+    }
+
+    pub fn of(scene: Scene) -> Self {
         let packed = PackedScene::new(&scene).expect("hierarchy");
         Self { scene, packed }
     }

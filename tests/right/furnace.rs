@@ -1,14 +1,15 @@
 //! Uniform radiance, which nothing that doesn't absorb can change.
 
-use glam::{DVec3, dvec3};
+use glam::{DVec3, Vec3, dvec3};
 use ppm_vk::config::{Direct, RenderConfig};
 use ppm_vk::metrics::mean;
+use ppm_vk::scene::Environment;
 
 use crate::document::{Document, clear, emitting, light, matte, mirror};
-use crate::measure::measure;
+use crate::measure::{Region, measure};
 use crate::mesh::Mesh;
 use crate::picture::{Subject, small};
-use crate::stage::{faceted, subject, walls};
+use crate::stage::{faceted, subject, subject_under, walls};
 
 /// Light goes round in a sphere of facets for long: of 1,000 paths one bounces 64 times.
 pub const MAX_DEPTH: u32 = 256;
@@ -76,14 +77,10 @@ fn a_mirror_and_glass_change_nothing_in_a_closed_furnace() {
     assert_shines_with_le_over_one_minus_rho(true, Direct::Photons, 25_000);
 }
 
-/// The plate reflects all it gets, by photons as well: its discs reach past its rims, but no light is lost there.
-#[test]
-fn a_white_plate_a_mirror_and_glass_vanish_before_walls_of_radiance_one() {
-    let mut scene = Document::new("vanishing");
-    let environment = scene.material(light("environment", [1.0; 3]));
+/// A white plate, a mirror and a glass sphere, where radiance 1 comes from everywhere. The plate reflects all it gets, by
+/// photons as well: its discs reach past its rims, but no light is lost there.
+fn assert_vanish(mut scene: Document, environment: Option<Environment>) {
     let white = scene.material(matte("white", [1.0; 3]));
-    let room = Mesh::cuboid(DVec3::splat(-1.5), DVec3::splat(1.5)).flipped();
-    scene.object("environment", &room, environment);
     let corner = |x, y| dvec3(x, y, -0.8);
     let plate = Mesh::quad([
         corner(-0.8, -0.8),
@@ -94,7 +91,7 @@ fn a_white_plate_a_mirror_and_glass_vanish_before_walls_of_radiance_one() {
     scene.object("plate", &plate, white);
     add_specular_spheres(&mut scene, 0.0);
     scene.camera([0.0, 1.45], [0.0, 0.0], 60.0);
-    let vanishing = subject(scene);
+    let vanishing = subject_under(scene, environment);
     for (direct, photons) in [(Direct::Light, 20_000), (Direct::Photons, 100_000)] {
         let config = RenderConfig {
             radius: Some(0.05),
@@ -104,5 +101,41 @@ fn a_white_plate_a_mirror_and_glass_vanish_before_walls_of_radiance_one() {
         for measured in measured {
             measured.assert_is(1.0, &format!("direct light by {direct:?}"));
         }
+    }
+}
+
+#[test]
+fn a_white_plate_a_mirror_and_glass_vanish_before_walls_of_radiance_one() {
+    let mut scene = Document::new("vanishing");
+    let walls = scene.material(light("walls", [1.0; 3]));
+    let room = Mesh::cuboid(DVec3::splat(-1.5), DVec3::splat(1.5)).flipped();
+    scene.object("walls", &room, walls);
+    assert_vanish(scene, None);
+}
+
+#[test]
+fn a_white_plate_a_mirror_and_glass_vanish_in_an_environment_of_radiance_one() {
+    assert_vanish(Document::new("vanishing-afar"), Some(Environment::constant(Vec3::ONE)));
+}
+
+/// Each pixel by itself: facets of a convex body see nothing of each other.
+#[test]
+fn a_white_sphere_has_the_radiance_of_the_constant_environment_around_it() {
+    let mut scene = Document::new("white-sphere");
+    let white = scene.material(matte("white", [1.0; 3]));
+    scene.object("sphere", &faceted(&Mesh::icosphere(1.0, 2)), white);
+    scene.camera([0.0, 2.5], [0.0, 0.0], 60.0);
+    let radiance = Vec3::new(0.5, 1.0, 3.0);
+    let sphere = subject_under(scene, Some(Environment::constant(radiance)));
+    let regions = [([16, 16], 4), ([10, 16], 3), ([16, 22], 3), ([4, 4], 3), ([16, 16], 16)];
+    let measured = measure(&sphere, config(Direct::Light, 1000), 32, |image| {
+        let means = regions.map(|(centre, half_side)| {
+            let region = Region::around(centre, half_side);
+            [0, 1, 2].map(|channel| region.of(image, channel))
+        });
+        means.as_flattened().to_vec()
+    });
+    for (measured, expected) in measured.iter().zip(radiance.to_array().iter().cycle()) {
+        measured.assert_is(f64::from(*expected), "a part of a sphere and what is around it");
     }
 }

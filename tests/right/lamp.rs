@@ -11,7 +11,7 @@ use crate::mesh::Mesh;
 use crate::picture::{Subject, small};
 use crate::stage::{mean_on_floor, mean_over_disc, subject};
 
-const SIDE: usize = 48;
+pub const SIDE: usize = 48;
 
 /// View factor from a point to the rectangle a × b whose corner is right above at height h, as an odd function of a and b:
 /// Howell, «A Catalog of Radiation Heat Transfer Configuration Factors», B-4 (with cosines on both sides).
@@ -31,7 +31,7 @@ fn irradiance_under_square(point: DVec3, half_side: f64, height: f64) -> f64 {
 /// Compares regions of a floor of albedo `albedo` with its irradiance in closed form, for red. Photons, if the light comes by
 /// them, blur it over a disc of the radius, which shrinks from the initial one: what is seen then lies between the
 /// irradiance and its mean over that disc.
-fn assert_floor_is_lit_by(
+pub fn assert_floor_is_lit_by(
     scene: &Subject,
     config: &RenderConfig,
     albedo: f64,
@@ -59,7 +59,7 @@ fn assert_floor_is_lit_by(
     }
 }
 
-fn config(direct: Direct, photons: u32, radius: f64) -> RenderConfig {
+pub fn config(direct: Direct, photons: u32, radius: f64) -> RenderConfig {
     RenderConfig {
         direct,
         radius: Some(radius),

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::fs;
 
 use glam::{DVec3, dvec3};
+use ppm_vk::scene::{Environment, LoadOptions, Scene};
 use tempfile::TempDir;
 
 use crate::document::Document;
@@ -12,12 +13,22 @@ use crate::picture::Subject;
 
 /// Loads a document.
 pub fn subject(document: Document) -> Subject {
+    subject_under(document, None)
+}
+
+/// Loads a document with an environment around it.
+pub fn subject_under(document: Document, environment: Option<Environment>) -> Subject {
     let folder = TempDir::new().expect("a temporary folder");
     let [file, buffer] = document.finish();
     for file in [&file, &buffer] {
         fs::write(folder.path().join(&file.name), &file.bytes).expect("a file in the temporary folder");
     }
-    let subject = Subject::at(&folder.path().join(&file.name));
+    let options = LoadOptions {
+        environment,
+        ..LoadOptions::default()
+    };
+    let scene = Scene::load_with(&folder.path().join(&file.name), options);
+    let subject = Subject::of(scene.unwrap_or_else(|error| panic!("{error}")));
     assert_eq!(subject.scene.warnings, [""; 0], "{}", file.name);
     subject
 }

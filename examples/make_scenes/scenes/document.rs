@@ -99,6 +99,7 @@ pub struct Document {
     meshes: Vec<Value>,
     materials: Vec<Value>,
     cameras: Vec<Value>,
+    lights: Vec<Value>,
     accessors: Vec<Value>,
     buffer_views: Vec<Value>,
     texture: Option<Value>,
@@ -114,6 +115,7 @@ impl Document {
             meshes: Vec::new(),
             materials: Vec::new(),
             cameras: Vec::new(),
+            lights: Vec::new(),
             accessors: Vec::new(),
             buffer_views: Vec::new(),
             texture: None,
@@ -167,14 +169,23 @@ impl Document {
         node.at([0.0, eye[0], eye[1]]).rotated([1.0, 0.0, 0.0], pitch);
     }
 
+    /// Adds a light of KHR_lights_punctual and a node that has it; it shines along −z.
+    pub fn punctual(&mut self, light: Value) -> Node<'_> {
+        let light = push(&mut self.lights, light);
+        self.node(json!({ "extensions": { "KHR_lights_punctual": { "light": light } } }))
+    }
+
     /// The document as NAME.gltf and NAME.bin.
     pub fn finish(self) -> [File; 2] {
-        let extensions: BTreeSet<&String> = self
+        let mut extensions: BTreeSet<&str> = self
             .materials
             .iter()
             .filter_map(|material| material.get("extensions")?.as_object())
-            .flat_map(|extensions| extensions.keys())
+            .flat_map(|extensions| extensions.keys().map(String::as_str))
             .collect();
+        if !self.lights.is_empty() {
+            extensions.insert("KHR_lights_punctual");
+        }
         let binary = format!("{}.bin", self.name);
         let mut document = json!({
             "asset": { "version": "2.0", "generator": "ppm-vk make_scenes", "copyright": "CC0-1.0" },
@@ -189,6 +200,9 @@ impl Document {
             "buffers": [{ "byteLength": self.buffer.len(), "uri": binary }],
             "extensionsUsed": extensions,
         });
+        if !self.lights.is_empty() {
+            document["extensions"] = json!({ "KHR_lights_punctual": { "lights": self.lights } });
+        }
         if let Some(image) = self.texture {
             document["images"] = json!([image]);
             document["samplers"] =

@@ -6,6 +6,8 @@ mod mesh;
 use document::{Document, File, clear, emitting, glass, light, matte, metallic_roughness, mirror, one_sided};
 use glam::{DVec3, dvec3};
 use mesh::Mesh;
+use serde_json::json;
+use std::f64::consts::FRAC_PI_2;
 
 /// Half the side of the rooms, which stand on the origin.
 const ROOM: f64 = 1.0;
@@ -26,6 +28,7 @@ pub fn all() -> Vec<File> {
         furnace_specular(),
         furnace_closed(),
         light_area(),
+        lights(),
         slab(),
     ]
     .into_iter()
@@ -218,6 +221,28 @@ fn light_area() -> Document {
     scene.object("floor", &Mesh::facing_up(2.0, 0.0), grey);
     scene.object("light", &Mesh::facing_down(0.5, 2.0), lamp);
     scene.camera([1.8, 1.8], [0.0, 0.0], 40.0);
+    scene
+}
+
+/// A glass and a matte sphere under a lamp, a spotlight and the sun, none of which has an extent.
+fn lights() -> Document {
+    let mut scene = Document::new("lights");
+    let floor = scene.material(matte("floor", [0.7; 3]));
+    let glass = scene.material(clear("glass", 1.5));
+    let clay = scene.material(matte("clay", [0.7, 0.4, 0.3]));
+    let sphere = Mesh::icosphere(0.4, 4);
+    scene.object("floor", &Mesh::facing_up(3.0, 0.0), floor);
+    scene.object("glass", &sphere, glass).at([-0.5, 0.5, 0.0]);
+    scene.object("clay", &sphere, clay).at([0.6, 0.4005, -0.2]);
+    let down = -FRAC_PI_2;
+    let lamp = json!({ "name": "lamp", "type": "point", "color": [1.0, 0.7, 0.4], "intensity": 3.0, "range": 6.0 });
+    scene.punctual(lamp).at([1.5, 1.2, 1.0]);
+    let cone = json!({ "innerConeAngle": 0.3, "outerConeAngle": 0.5 });
+    let spot = json!({ "name": "spot", "type": "spot", "color": [0.5, 0.8, 1.0], "intensity": 20.0, "spot": cone });
+    scene.punctual(spot).at([-0.5, 2.5, 0.0]).rotated([1.0, 0.0, 0.0], down);
+    let sun = json!({ "name": "sun", "type": "directional", "intensity": 0.7 });
+    scene.punctual(sun).rotated([1.0, 0.0, 0.0], 0.6 * down);
+    scene.camera([1.8, 3.2], [0.3, 0.0], 35.0);
     scene
 }
 
