@@ -424,3 +424,73 @@ fn lists_go_to_stdout() {
         }
     }
 }
+
+/// A picture of 2 × 1 pixels in the Radiance format: both channels' mantissas and a shared exponent.
+fn write_hdr(file: &Path, pixels: [[u8; 4]; 2]) {
+    let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n".to_vec();
+    bytes.extend(pixels.as_flattened());
+    std::fs::write(file, bytes).expect("a picture");
+}
+
+#[test]
+fn an_environment_is_a_radiance_or_a_picture() {
+    let folder = TempDir::new().expect("folder");
+    let one = [128, 128, 128, 129];
+    write_hdr(&folder.path().join("sky.HDR"), [one, one]);
+    let mut pictures = Vec::new();
+    for (environment, file) in [("1,1,1", "constant.exr"), ("sky.HDR", "picture.exr")] {
+        let more = ["--environment", environment, "-o", file];
+        let output = small_render(folder.path(), &scene("lights.gltf"), &more);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        pictures.push(ppm_vk::film::read_exr(&folder.path().join(file)).expect("picture"));
+    }
+    let [constant, picture] = [0, 1].map(|i| ppm_vk::metrics::mean(&pictures[i])[0]);
+    assert!(
+        (picture / constant - 1.0).abs() < 0.1,
+        "{picture} is not about {constant}"
+    );
+}
+
+#[test]
+fn environments_that_cannot_be_read_are_one_line() {
+    let folder = TempDir::new().expect("folder");
+    let at = |name: &str| folder.path().join(name);
+    write_hdr(&at("black.hdr"), [[0; 4]; 2]);
+    std::fs::write(at("text.hdr"), "no picture").expect("a file");
+    std::fs::write(at("text.jpg"), "no picture").expect("a file");
+    for (file, words) in [
+        ("none.hdr", &["none.hdr", "can't be opened"][..]),
+        ("none.exr", &["none.exr"]),
+        ("text.hdr", &["text.hdr", "Radiance HDR"]),
+        ("text.jpg", &["text.jpg", ".exr or .hdr"]),
+        ("1,1", &["three numbers"]),
+        ("black.hdr", &["black.hdr", "black"]),
+    ] {
+        let output = small_render(folder.path(), &scene("lights.gltf"), &["--environment", file]);
+        assert_fails(&folder, &output, words);
+    }
+    for radiance in ["0,0,0", "1,nan,1", "-1,0,0", "1,1,inf"] {
+        let flag = format!("--environment={radiance}");
+        let output = small_render(folder.path(), &scene("lights.gltf"), &[&flag]);
+        assert_refused(&output, "--environment");
+    }
+}
+
+#[test]
+fn values_of_an_environment_that_are_no_radiance_are_counted() {
+    let folder = TempDir::new().expect("folder");
+    let image = ppm_vk::film::Image::new(2, 1, vec![[f32::NAN, 1.0, -1.0], [1.0; 3]]);
+    let metadata = ppm_vk::film::Metadata {
+        iterations: 1,
+        photons_emitted: 0,
+        seed: 0,
+        device: String::new(),
+        seconds: 0.0,
+        estimated_error: None,
+    };
+    ppm_vk::film::write_exr(&image, None, &folder.path().join("sky.exr"), &metadata).expect("a picture");
+    let output = small_render(folder.path(), &scene("lights.gltf"), &["--environment", "sky.exr"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let text = stderr(&output);
+    assert!(text.contains("warning: 2 values of the environment"), "{text}");
+}

@@ -78,6 +78,10 @@ pub struct RenderArguments {
     /// glTF file to render (.gltf or .glb).
     #[arg(long, value_name = "FILE", required = true)]
     pub scene: Option<PathBuf>,
+    /// Light from all around the scene: an equirectangular picture (.hdr or .exr) or one radiance (R,G,B) [default: none, or
+    /// 1,1,1 for a scene without any light].
+    #[arg(long, value_name = "FILE|R,G,B", value_parser = environment)]
+    pub environment: Option<EnvironmentChoice>,
     /// Linear RGB OpenEXR picture [default: the scene's name with .exr, in the current folder].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -161,6 +165,29 @@ pub struct RenderArguments {
     /// No progress bar.
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// What `--environment` asks for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EnvironmentChoice {
+    /// One radiance, linear RGB.
+    Constant([f32; 3]),
+    /// A picture.
+    Picture(PathBuf),
+}
+
+/// Three numbers, or else the name of a file.
+fn environment(text: &str) -> Result<EnvironmentChoice, String> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let Some(Ok(radiance)) = numbers.map(<[f32; 3]>::try_from) else {
+        return Ok(EnvironmentChoice::Picture(text.into()));
+    };
+    let is_radiance = radiance.iter().all(|value| value.is_finite() && *value >= 0.0);
+    if is_radiance && radiance != [0.0; 3] {
+        Ok(EnvironmentChoice::Constant(radiance))
+    } else {
+        Err("a radiance must be finite and not negative, and above 0 in one channel".to_owned())
+    }
 }
 
 pub fn resolution(text: &str) -> Result<[u32; 2], String> {

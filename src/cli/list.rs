@@ -67,6 +67,7 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
         .map_err(|what| crate::error::Error::scene(path, what))?;
     let memory = memory(&scene, &packed);
     let count = |is: fn(&Surface) -> bool| scene.materials.iter().filter(|material| is(&material.surface)).count();
+    let emissive = scene.emissive_triangles().len();
     let to_world = |p: glam::Vec3| p.as_dvec3() / scene.normalisation.scale + scene.normalisation.centre;
     let (low, high) = scene.bounds();
     let (low, high) = (to_world(low), to_world(high));
@@ -81,7 +82,9 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
                 "dielectric": count(|s| matches!(s, Surface::Dielectric(_))),
                 "glossy": count(|s| matches!(s, Surface::Glossy(_))),
             },
-            "emissive_triangles": packed.lights.len(),
+            "emissive_triangles": emissive,
+            "punctual_lights": scene.lights.len(),
+            "environment": scene.environment.is_some(),
             "cameras": scene.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
             "features": packed.features.names(),
             "bounds": { "min": low.to_array(), "max": high.to_array() },
@@ -111,7 +114,16 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
         count(|s| matches!(s, Surface::Dielectric(_))),
         count(|s| matches!(s, Surface::Glossy(_)))
     )?;
-    writeln!(text, "lights       {} emissive triangles", packed.lights.len())?;
+    writeln!(
+        text,
+        "lights       {emissive} emissive triangles, {} punctual{}",
+        scene.lights.len(),
+        if scene.environment.is_some() {
+            ", an environment"
+        } else {
+            ""
+        }
+    )?;
     for (index, camera) in scene.cameras.iter().enumerate() {
         writeln!(text, "camera {index:<5} {}", camera.name)?;
     }

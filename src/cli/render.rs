@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
-use super::args::{Arguments, BackendChoice, RenderArguments};
+use super::args::{Arguments, BackendChoice, EnvironmentChoice, RenderArguments};
 use super::outputs::check_outputs;
 use super::progress::{BUILDING, Limits, Progress, READING, while_showing, with_prefix};
 use super::{Outcome, interrupt};
@@ -20,7 +20,7 @@ use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
 use crate::report::{Profile, Subject};
-use crate::scene::{Camera, LoadOptions, PackedScene, Scene};
+use crate::scene::{Camera, Environment, LoadOptions, PackedScene, Scene};
 
 /// Width of a picture without --resolution.
 const DEFAULT_WIDTH: u32 = 1280;
@@ -35,11 +35,21 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let (backend_choice, gather) = choose_backend(arguments);
     let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
     // Before any work: nobody wants to learn after an hour that the picture can't be written.
-    check_outputs(&[path], outputs(arguments, &output))?;
+    let mut inputs = vec![path];
+    if let Some(EnvironmentChoice::Picture(picture)) = &arguments.environment {
+        inputs.push(picture);
+    }
+    check_outputs(&inputs, outputs(arguments, &output))?;
     interrupt::install()?;
 
+    let environment = match &arguments.environment {
+        None => None,
+        Some(EnvironmentChoice::Constant(radiance)) => Some(Environment::constant((*radiance).into())),
+        Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture)?),
+    };
     let options = LoadOptions {
         frame_time: arguments.frame_time,
+        environment,
     };
     let quiet = arguments.quiet;
     let scene = while_showing(READING, quiet, || Scene::load_with(path, options))?;
