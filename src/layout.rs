@@ -27,6 +27,38 @@ pub const SMOOTH_SHADED: u32 = 1;
 /// Bit of [`ShadingTriangle::flags`]: a dielectric's, and it may lie on a face of another object.
 pub const TOUCHED: u32 = 2;
 
+/// Bit of [`ShadingTriangle::flags`]: its material depends on the place, by textures or its corners' colours.
+pub const TEXTURED: u32 = 4;
+/// Bit of [`ShadingTriangle::flags`]: parts of it may not be there, see [`Material::alpha_mode`].
+pub const SEE_THROUGH: u32 = 8;
+
+/// Texture of a material that has none there.
+pub const NO_TEXTURE: u32 = u32::MAX;
+
+/// [`Material::alpha_mode`] of what is all there.
+pub const OPAQUE: u32 = 0;
+/// [`Material::alpha_mode`] of what is there where alpha reaches the cutoff.
+pub const MASK: u32 = 1;
+/// [`Material::alpha_mode`] of what is there with alpha as probability.
+pub const BLEND: u32 = 2;
+
+/// Bit of [`TextureLookup::flags`]: the second set of coordinates.
+pub const SECOND_SET: u32 = 1;
+/// Bit of [`TextureLookup::flags`]: texels hold sRGB.
+pub const SRGB: u32 = 2;
+/// Bit of [`TextureLookup::flags`]: the nearest texel instead of a blend of four.
+pub const NEAREST: u32 = 4;
+/// Place of the wrap along u in [`TextureLookup::flags`]: [`REPEAT`], [`CLAMP`] or [`MIRROR_REPEAT`].
+pub const WRAP_U: u32 = 4;
+/// Place of the wrap along v.
+pub const WRAP_V: u32 = 6;
+/// Wrap: begins anew.
+pub const REPEAT: u32 = 0;
+/// Wrap: the texel at the edge goes on.
+pub const CLAMP: u32 = 1;
+/// Wrap: goes back and forth.
+pub const MIRROR_REPEAT: u32 = 2;
+
 /// Bit of [`StatusCounters::again`]: a lane's photons or a batch's didn't fit.
 pub const PHOTONS_DID_NOT_FIT: u32 = 1;
 /// Bit of [`StatusCounters::again`]: a lane's paths need more loop iterations than the driver gives.
@@ -138,14 +170,48 @@ device_structs! {
         pub object: u32,
         /// Index of its material.
         pub material: u32,
-        /// [`SMOOTH_SHADED`], [`TOUCHED`].
+        /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED`], [`SEE_THROUGH`].
         pub flags: u32,
         /// Index of its light, or [`NO_LIGHT`].
         pub light: u32,
     }
 
-    /// A material.
-    pub struct Material: 80 {
+    /// What the corner of a triangle has for textures.
+    pub struct Corner: 32 {
+        /// Coordinates of the first set.
+        pub first: [f32; 2],
+        /// Of the second set.
+        pub second: [f32; 2],
+        /// Factor of the base colour, linear RGBA, f16s.
+        pub color: [u32; 2],
+        /// Octahedral tangent.
+        pub tangent: u32,
+        /// 1 or −1 for the bitangent's side, 0 where there is no tangent.
+        pub bitangent: f32,
+    }
+
+    /// How a texture is looked up. A place is row · (u, v, 1), in widths and heights of the image.
+    pub struct TextureLookup: 48 {
+        /// To the place along the image's width.
+        pub row_u: [f32; 3],
+        /// Index of the image's first texel, which is the top left one: RGBA, a byte each.
+        pub first_texel: u32,
+        /// To the place along the image's height.
+        pub row_v: [f32; 3],
+        /// Width, and height in the upper half.
+        pub size: u32,
+        /// [`SECOND_SET`], [`SRGB`], [`NEAREST`], and the wraps at [`WRAP_U`] and [`WRAP_V`].
+        pub flags: u32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+        /// Zero.
+        pub padding2: u32,
+    }
+
+    /// A material. Textures are indices of [`TextureLookup`]s, or [`NO_TEXTURE`]; each is a factor.
+    pub struct Material: 128 {
         /// Linear RGB albedo, reflectance or tint.
         pub base_color: [f32; 3],
         /// 0 matte, 1 mirror, 2 dielectric, 3 glossy.
@@ -156,11 +222,11 @@ device_structs! {
         pub ior: f32,
         /// 1 where the back emits as well.
         pub double_sided: u32,
-        /// How far a glossy surface is a metal.
+        /// How far the surface is a metal.
         pub metallic: f32,
         /// Of a glossy surface; its square is GGX's α.
         pub roughness: f32,
-        /// Share of a dielectric that passes light; the rest is glossy.
+        /// Share of what is no metal that passes light, of a dielectric; the rest is glossy.
         pub transmission: f32,
         /// Reflectance at normal incidence of the glossy surface's dielectric part, linear RGB.
         pub specular_f0: [f32; 3],
@@ -170,6 +236,30 @@ device_structs! {
         pub absorption: [f32; 3],
         /// 1 for a dielectric that is a thin wall, without an inside.
         pub thin: u32,
+        /// Of the base colour, its alpha with it.
+        pub color_texture: u32,
+        /// Roughness in green, how far it is a metal in blue.
+        pub metal_texture: u32,
+        /// Normals in the space of the tangent.
+        pub normal_texture: u32,
+        /// Of the emission.
+        pub emission_texture: u32,
+        /// In red.
+        pub transmission_texture: u32,
+        /// Of the reflectance at both angles, in alpha.
+        pub specular_texture: u32,
+        /// Of the reflectance at normal incidence.
+        pub specular_color_texture: u32,
+        /// How far the normals of their texture lean.
+        pub normal_scale: f32,
+        /// [`OPAQUE`], [`MASK`] or [`BLEND`].
+        pub alpha_mode: u32,
+        /// Of [`MASK`].
+        pub alpha_cutoff: f32,
+        /// Factor of alpha.
+        pub alpha: f32,
+        /// Zero.
+        pub padding: u32,
     }
 
     /// A light, and a cell of the alias table that chooses one. What its kind doesn't use is zero.

@@ -18,6 +18,12 @@ pub enum BufferId {
     ShadingTriangles,
     /// [`crate::layout::Material`]s.
     Materials,
+    /// [`crate::layout::Corner`]s, three to a triangle, where the scene is textured.
+    Corners,
+    /// [`crate::layout::TextureLookup`]s.
+    Textures,
+    /// Texels of all images, RGBA bytes.
+    Texels,
     /// [`crate::layout::Light`]s.
     Lights,
     /// What shines from afar, and how directions are chosen from it; see `glsl/shared/environment.glsl`.

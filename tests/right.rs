@@ -34,5 +34,7 @@ mod picture;
 mod references;
 #[path = "right/stage.rs"]
 mod stage;
+#[path = "right/texture.rs"]
+mod texture;
 #[path = "right/transmission.rs"]
 mod transmission;

@@ -34,3 +34,5 @@ mod materials;
 mod mutation;
 #[path = "scene/tangents.rs"]
 mod tangents;
+#[path = "scene/textures.rs"]
+mod textures;

@@ -1,4 +1,4 @@
-// Dielectrics that lie on other objects. Include after intersect.glsl.
+// Dielectrics that lie on other objects. Include after texture.glsl and intersect.glsl.
 
 // Where a ray meets matter: a surface, and the index of refraction on its outer side.
 struct Encounter {
@@ -16,50 +16,47 @@ const uint VACUUM = 0xffffffffu;
 // Rounding decides which of two faces in one place a ray meets first, and the step off the one takes it past the other: where
 // they are no further apart, both are crossed at once. Glass on glass is one boundary between the two; where glass lies on
 // something opaque, that is what the ray meets.
-// medium: the material that the ray is in, as far as its path knows.
+// medium: the material that the ray is in, as far as its path knows. The other side's tint is that without its textures.
 Encounter encounter(Hit hit, vec3 incoming, uint medium) {
     Encounter met;
     met.surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
-    met.material = material_at(met.surface.material);
-    met.facing = face(met.surface, incoming);
     met.outside = 1.0;
-    met.tint = met.material.base_color;
     met.through = medium;
     met.beyond = medium;
-    if (is_dielectric(met.material) && !is_thin(met.material)) {
-        met.through = met.facing.front ? medium : met.surface.material;
-        met.beyond = met.facing.front ? met.surface.material : VACUUM;
+    bool front = dot(incoming, met.surface.geometric_normal) < 0.0;
+    Material first = material_at(met.surface.material);
+    if (is_dielectric(first) && !is_thin(first)) {
+        met.through = front ? medium : met.surface.material;
+        met.beyond = front ? met.surface.material : VACUUM;
     }
+    vec3 other_tint = vec3(1.0);
     bool touched = CONTACT && (met.surface.flags & TOUCHED) != 0u;
-    if (!touched) {
-        return met;
-    }
-    vec3 n = met.surface.geometric_normal;
-    float step_off = ROUNDINGS * dot(abs(n), met.surface.reach);
-    float probe = ROUNDINGS * (met.surface.reach.x + met.surface.reach.y + met.surface.reach.z);
-    Hit other_hit = trace(met.surface.position + probe * n, -2.0 * probe * n, 1.0, hit.triangle, false);
-    if (other_hit.triangle == MISS) {
-        return met;
-    }
-    Surface other = surface_at(other_hit.triangle, vec2(other_hit.u, other_hit.v));
-    bool apart = abs(dot(other.position - met.surface.position, n)) > step_off;
-    if (apart || other.object == met.surface.object) {
-        return met;
-    }
-    Material other_material = material_at(other.material);
-    if (!is_dielectric(other_material)) {
-        met.surface = other;
-        met.material = other_material;
-        met.facing = face(other, incoming);
-    } else if (dot(other.geometric_normal, n) < 0.0) {
-        met.outside = other_material.ior;
-        met.tint *= other_material.base_color;
-        if (met.facing.front) {
-            met.through = other.material;
-        } else {
-            met.beyond = other.material;
+    if (touched) {
+        vec3 n = met.surface.geometric_normal;
+        float step_off = ROUNDINGS * dot(abs(n), met.surface.reach);
+        float probe = ROUNDINGS * (met.surface.reach.x + met.surface.reach.y + met.surface.reach.z);
+        Hit other_hit = trace(met.surface.position + probe * n, -2.0 * probe * n, 1.0, hit.triangle, false);
+        if (other_hit.triangle != MISS) {
+            Surface other = surface_at(other_hit.triangle, vec2(other_hit.u, other_hit.v));
+            bool apart = abs(dot(other.position - met.surface.position, n)) > step_off;
+            bool meets_other = !apart && other.object != met.surface.object;
+            Material other_material = material_at(other.material);
+            if (meets_other && !is_dielectric(other_material)) {
+                met.surface = other;
+            } else if (meets_other && dot(other.geometric_normal, n) < 0.0) {
+                met.outside = other_material.ior;
+                other_tint = other_material.base_color;
+                if (front) {
+                    met.through = other.material;
+                } else {
+                    met.beyond = other.material;
+                }
+            }
         }
     }
+    met.material = material_of(met.surface);
+    met.facing = face(met.surface, incoming);
+    met.tint = met.material.base_color * other_tint;
     return met;
 }
 
@@ -68,7 +65,7 @@ vec3 transmittance(uint medium, float distance) {
     bool absorbs = ABSORPTION && medium != VACUUM;
     vec3 absorption = vec3(0.0);
     if (absorbs) {
-        absorption = TEXEL(Materials, 5u * medium + 4u).rgb;
+        absorption = TEXEL(Materials, MATERIAL_TEXELS * medium + 4u).rgb;
     }
     return exp(-absorption * distance);
 }

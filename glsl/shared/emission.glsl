@@ -73,14 +73,14 @@ Emission emit(inout Random random) {
         emission = emit_environment(light.area, place, u.zw);
     } else {
         Surface emitter = surface_at(light.triangle, triangle_point(place));
-        Material material = material_at(emitter.material);
+        Material material = material_of(emitter);
         vec3 normal = emitter.geometric_normal;
         if (material.double_sided != 0u && w.y < 0.5) {
             normal = -normal;
         }
         float sides = material.double_sided != 0u ? 2.0 : 1.0;
         emission = Emission(offset_origin(emitter.position, normal, emitter.reach), cosine_direction(normal, u.zw),
-                            material.emission * (PI * sides * light.area), light.triangle, 0.0);
+                            material.emission * (PI * sides * light.area * share_there(emitter)), light.triangle, 0.0);
     }
     emission.flux /= light.probability;
     return emission;

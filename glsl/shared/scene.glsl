@@ -10,6 +10,8 @@ layout(constant_id = 12) const bool PARTLY_CLEAR = false;
 layout(constant_id = 13) const bool ABSORPTION = false;
 layout(constant_id = 14) const bool PUNCTUAL_LIGHTS = false;
 layout(constant_id = 15) const bool ENVIRONMENT = false;
+layout(constant_id = 16) const bool TEXTURED = false;
+layout(constant_id = 17) const bool ALPHA = false;
 
 const uint MISS = 0xffffffffu;
 
@@ -47,14 +49,29 @@ struct Material {
     vec3 emission;     // radiance
     float ior;
     uint double_sided; // emits on both sides
-    float metallic;    // of a glossy surface
+    float metallic;
     float roughness;
-    float transmission; // share of a dielectric that passes light; the rest is glossy
+    float transmission; // share of a dielectric's part that is no metal that passes light; the rest is glossy
     vec3 specular_f0;   // of a glossy surface's dielectric part
     float specular_f90;
     vec3 absorption;    // inside of a dielectric, 1/length
     uint thin;          // a dielectric without an inside
+    // For texture.glsl, which reads them by itself.
+    uint color_texture;
+    uint metal_texture;
+    uint normal_texture;
+    uint emission_texture;
+    uint transmission_texture;
+    uint specular_texture;
+    uint specular_color_texture;
+    float normal_scale;
+    uint alpha_mode;
+    float alpha_cutoff;
+    float alpha;
+    uint padding;
 };
+
+const uint MATERIAL_TEXELS = 8u;
 
 uniform usamplerBuffer Bvh;
 uniform usamplerBuffer HavelTriangles;
@@ -73,20 +90,20 @@ ShadingTriangle shading_triangle(uint i) {
 }
 
 Material material_at(uint i) {
-    vec4 color = TEXEL(Materials, 5u * i);
-    vec4 emission = TEXEL(Materials, 5u * i + 1u);
-    uvec4 rest = TEXEL_BITS(Materials, 5u * i + 2u);
+    vec4 color = TEXEL(Materials, MATERIAL_TEXELS * i);
+    vec4 emission = TEXEL(Materials, MATERIAL_TEXELS * i + 1u);
+    uvec4 rest = TEXEL_BITS(Materials, MATERIAL_TEXELS * i + 2u);
     vec4 specular = vec4(0.0);
     uvec4 inside = uvec4(0u);
     if (GLOSSY) {
-        specular = TEXEL(Materials, 5u * i + 3u);
+        specular = TEXEL(Materials, MATERIAL_TEXELS * i + 3u);
     }
     if (DIELECTRICS) {
-        inside = TEXEL_BITS(Materials, 5u * i + 4u);
+        inside = TEXEL_BITS(Materials, MATERIAL_TEXELS * i + 4u);
     }
     return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, uintBitsToFloat(rest.y),
                     uintBitsToFloat(rest.z), uintBitsToFloat(rest.w), specular.rgb, specular.w,
-                    uintBitsToFloat(inside.xyz), inside.w);
+                    uintBitsToFloat(inside.xyz), inside.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0u, 0.0, 0.0, 0u);
 }
 
 bool is_mirror(Material material) {
@@ -104,9 +121,10 @@ bool is_thin(Material material) {
 // A surface that passes a part of the light only is by chance all clear or all glossy; u is a uniform number again after
 // that. Returns whether it has a glossy part.
 bool choose_part(inout Material material, inout float u) {
-    bool mixed = PARTLY_CLEAR && is_dielectric(material) && material.transmission < 1.0;
+    float t = material.transmission * (1.0 - material.metallic);
+    bool mixed = PARTLY_CLEAR && is_dielectric(material) && t < 1.0;
     if (mixed) {
-        float t = material.transmission;
+        material.metallic = min(material.metallic / (1.0 - t), 1.0); // of what isn't clear
         bool clear = u < t;
         u = clear ? u / t : (u - t) / (1.0 - t);
         material.surface = clear ? DIELECTRIC : GLOSSY_SURFACE;
@@ -141,6 +159,7 @@ struct Surface {
     vec3 reach;            // largest coordinates of the triangle's corners, without their signs
     vec3 geometric_normal; // of the triangle's front
     vec3 shading_normal;   // on the same side
+    vec2 uv;               // barycentric coordinates of the second and the third corner
     uint triangle;
     uint object;
     uint material;
@@ -170,6 +189,7 @@ Surface surface_at(uint index, vec2 uv) {
     surface.reach = max(max(abs(triangle.p0.xyz), abs(triangle.p1.xyz)), abs(triangle.p2.xyz));
     surface.geometric_normal = normalize(cross(e1, e2));
     surface.shading_normal = interpolated_normal(triangle, uv, surface.geometric_normal);
+    surface.uv = uv;
     surface.triangle = index;
     surface.object = triangle.object;
     surface.material = triangle.material;

@@ -12,6 +12,8 @@ layout(local_size_x = 64) in;
 #include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"
+#include "texture.glsl"
+#include "alpha.glsl"
 #include "bsdf.glsl"
 #include "contact.glsl"
 #include "environment.glsl"
@@ -58,8 +60,8 @@ struct Glimpse {
     bool dark; // nothing is there that scatters light
 };
 
-Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium) {
-    Hit hit = trace(origin, direction, 1e30, ignored, false);
+Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium, Random random) {
+    Hit hit = trace_visible(origin, direction, 1e30, ignored, false, random);
     if (loops_cut) {
         return Glimpse(vec3(0.0), true);
     }
@@ -122,7 +124,7 @@ void main() {
         loop_count += 1u;
         bool ended = true;
         visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
-        Hit hit = trace(branch.origin, branch.direction, 1e30, branch.ignored, false);
+        Hit hit = trace_visible(branch.origin, branch.direction, 1e30, branch.ignored, false, random);
         if (loops_cut) {
             cut = true;
         } else if (hit.triangle != MISS) {
@@ -198,7 +200,7 @@ void main() {
                         // A lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
                         branch.reflection_seen = true;
                         vec3 from = origin_towards(surface, boundary.reflected);
-                        Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle, met.through);
+                        Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle, met.through, random);
                         branch.emitted += branch.throughput * boundary.reflectance * boundary.reflected_weight *
                                           reflection.emission;
                         if (reflection.dark) {

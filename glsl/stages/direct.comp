@@ -13,6 +13,8 @@ layout(local_size_x = 64) in;
 #include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"
+#include "texture.glsl"
+#include "alpha.glsl"
 #include "bsdf.glsl"
 #include "environment.glsl"
 #include "light.glsl"
@@ -117,7 +119,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     if (dot(ray, geometric_normal) <= 0.0 || dot(ray, shading_normal) <= 0.0) {
         return vec3(0.0);
     }
-    Hit hit = trace(origin, ray, question.end, question.ignored, !by_bsdf);
+    Hit hit = trace_visible(origin, ray, question.end, question.ignored, !by_bsdf, random);
     if (loops_cut) {
         atomicAdd(status.cut_paths, 1u);
         return vec3(0.0);
@@ -151,7 +153,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
             return vec3(0.0);
         }
         Light light = light_at(emitter.light);
-        Material material = material_at(emitter.material);
+        Material material = material_of(emitter);
         vec3 to_light = emitter.position - position;
         float distance2 = dot(to_light, to_light);
         direction = to_light * inversesqrt(max(distance2, 1e-37));
@@ -159,7 +161,9 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
         if (!emits(material, cos_light > 0.0) || cos_light == 0.0) {
             return vec3(0.0);
         }
-        radiance = material.emission;
+        // A ray that met the light had its chance to pass it.
+        float there = by_bsdf ? 1.0 : share_there(emitter);
+        radiance = there * material.emission;
         of_light = light.probability * distance2 / (light.area * abs(cos_light));
     }
     float cos_surface = dot(direction, shading_normal);

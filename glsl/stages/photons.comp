@@ -14,6 +14,8 @@ layout(local_size_x = 64) in;
 #include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"
+#include "texture.glsl"
+#include "alpha.glsl"
 #include "bsdf.glsl"
 #include "contact.glsl"
 #include "environment.glsl"
@@ -95,9 +97,12 @@ void main() {
                                       settings.seed);
             path = start(random);
             next += settings.photon_lanes;
-            alive = true;
+            alive = largest(path.flux) > 0.0;
+            if (!alive) {
+                continue;
+            }
         }
-        Hit hit = trace(path.origin, path.direction, 1e30, path.ignored, false);
+        Hit hit = trace_visible(path.origin, path.direction, 1e30, path.ignored, false, random);
         if (loops_cut) {
             break;
         }

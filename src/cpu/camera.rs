@@ -9,11 +9,12 @@ use rayon::prelude::*;
 use super::contact::{Encounter, choose_part, transmittance};
 use super::environment::Environment;
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
-use super::intersect::{Ray, nearest_hit};
+use super::intersect::Ray;
 use super::light::emits;
 use super::random::{PathKind, Random};
 use super::sampling::encode_direction;
 use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface};
+use super::texture::nearest_visible;
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
@@ -37,8 +38,8 @@ struct Branch {
 }
 
 /// Radiance of the first surface on a ray's way, and whether nothing is there that scatters light.
-fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u32>) -> (DVec3, bool) {
-    let Some(hit) = nearest_hit(inputs, ray, FAR, ignored) else {
+fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u32>, random: &Random) -> (DVec3, bool) {
+    let Some(hit) = nearest_visible(inputs, ray, FAR, ignored, random) else {
         return (
             Environment::of(&inputs.scene.environment).at(ray.direction).radiance,
             true,
@@ -47,7 +48,7 @@ fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u
     let met = Encounter::new(inputs, hit, ray.direction, medium);
     let material = met.surface.material;
     let dark = material.surface == MATTE && rgb(material.base_color).max_element() == 0.0;
-    if emits(material, met.facing.front) {
+    if emits(&material, met.facing.front) {
         (rgb(material.emission) * transmittance(inputs, met.through, hit.t), dark)
     } else {
         (DVec3::ZERO, dark)
@@ -131,7 +132,7 @@ fn nothing_seen(emitted: DVec3) -> Slot {
 }
 
 /// The visible point of a path that ends on a surface.
-fn seen(inputs: &Inputs<'_>, branch: &Branch, surface: &Surface<'_>, facing: &Facing, reflector: Reflector) -> Slot {
+fn seen(inputs: &Inputs<'_>, branch: &Branch, surface: &Surface, facing: &Facing, reflector: Reflector) -> Slot {
     if reflector.diffuse.max_element() == 0.0 && reflector.alpha == 0.0 {
         return nothing_seen(branch.emitted);
     }
@@ -177,7 +178,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
     let mut used = 0;
     while let Some(mut branch) = pending.pop() {
         slots[used] = loop {
-            let Some(hit) = nearest_hit(inputs, branch.ray, FAR, branch.ignored) else {
+            let Some(hit) = nearest_visible(inputs, branch.ray, FAR, branch.ignored, &random) else {
                 if !branch.emission_seen {
                     let sky = Environment::of(&inputs.scene.environment).at(branch.ray.direction);
                     branch.emitted += branch.throughput * sky.radiance;
@@ -189,7 +190,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let (surface, facing) = (met.surface, met.facing);
             branch.throughput *= transmittance(inputs, met.through, hit.t);
             let base_color = rgb(surface.material.base_color);
-            if emits(surface.material, facing.front) {
+            if emits(&surface.material, facing.front) {
                 let emission = rgb(surface.material.emission);
                 branch.emitted += if branch.emission_seen {
                     DVec3::ZERO
@@ -198,14 +199,15 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 };
             }
             branch.emission_seen = false;
-            let mut kind = surface.material.surface;
+            let mut material = surface.material;
             if inputs.scene.features.partly_clear {
-                (kind, ..) = choose_part(surface.material, random.next4()[0]);
+                choose_part(&mut material, random.next4()[0]);
             }
+            let kind = material.surface;
             let (is_matte, is_glossy) = (kind == MATTE, kind == GLOSSY);
             // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
             let reflector = if is_glossy {
-                Reflector::of_material(surface.material)
+                Reflector::of_material(&material)
             } else {
                 Reflector::matte(base_color)
             };
@@ -255,7 +257,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
                 facing.reflect(incoming)
             } else {
-                let boundary = Boundary::new(&facing, incoming, surface.material, met.outside, [second, third]);
+                let boundary = Boundary::new(&facing, incoming, &material, met.outside, [second, third]);
                 // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
                 let transmission = met.tint * boundary.eta.powi(2) * boundary.refracted_weight;
                 match boundary.refracted {
@@ -283,7 +285,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                                 origin: surface.origin_towards(boundary.reflected),
                                 direction: boundary.reflected,
                             };
-                            let (emission, dark) = glimpse(inputs, ray, Some(surface.triangle), met.through);
+                            let (emission, dark) = glimpse(inputs, ray, Some(surface.triangle), met.through, &random);
                             branch.emitted +=
                                 branch.throughput * boundary.reflectance * boundary.reflected_weight * emission;
                             if dark {

@@ -5,12 +5,13 @@ use glam::DVec3;
 use super::Inputs;
 use super::intersect::{Hit, Ray, nearest_hit};
 use super::surface::{DIELECTRIC, Facing, GLOSSY, ROUNDINGS, Surface, surface_at};
+use super::texture::apply_textures;
 use super::vector::rgb;
 use crate::layout::{Material, TOUCHED};
 
 /// Where a ray meets matter.
-pub(super) struct Encounter<'a> {
-    pub surface: Surface<'a>,
+pub(super) struct Encounter {
+    pub surface: Surface,
     pub facing: Facing,
     /// Index of refraction outside of a dielectric.
     pub outside: f64,
@@ -22,13 +23,17 @@ pub(super) struct Encounter<'a> {
     pub beyond: Option<u32>,
 }
 
-impl<'a> Encounter<'a> {
+impl Encounter {
     /// Which of two faces in one place comes first is chance: both are crossed at once. Glass on glass is one boundary between
     /// the two; on something opaque that is what the ray meets. `medium`: the material that the ray is in, as far as its
     /// path knows.
-    pub fn new(inputs: &Inputs<'a>, hit: Hit, incoming: DVec3, medium: Option<u32>) -> Self {
+    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, medium: Option<u32>) -> Self {
         let at = |hit: Hit| surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
-        let surface = at(hit);
+        let textured = |mut surface: Surface| {
+            apply_textures(inputs.scene, &mut surface);
+            surface
+        };
+        let surface = textured(at(hit));
         let own = Some(surface.material_index);
         let solid = surface.material.surface == DIELECTRIC && surface.material.thin == 0;
         let (through, beyond) = match (solid, Facing::new(&surface, incoming).front) {
@@ -36,7 +41,7 @@ impl<'a> Encounter<'a> {
             (true, true) => (medium, own),
             (true, false) => (own, None),
         };
-        let alone = |surface: Surface<'a>| Self {
+        let alone = |surface: Surface| Self {
             facing: Facing::new(&surface, incoming),
             outside: 1.0,
             tint: rgb(surface.material.base_color),
@@ -54,12 +59,12 @@ impl<'a> Encounter<'a> {
             origin: surface.position + probe,
             direction: -2.0 * probe,
         };
-        let touches = |other: &Surface<'_>| {
+        let touches = |other: &Surface| {
             other.object != surface.object && (other.position - surface.position).dot(n).abs() <= step
         };
         let other = nearest_hit(inputs, through, 1.0, Some(hit.triangle)).map(at);
         match other.filter(touches) {
-            Some(other) if other.material.surface != DIELECTRIC => alone(other),
+            Some(other) if other.material.surface != DIELECTRIC => alone(textured(other)),
             Some(other) if other.geometric_normal.dot(n) < 0.0 => {
                 let met = alone(surface);
                 let other_side = Some(other.material_index);
@@ -83,15 +88,19 @@ pub(super) fn transmittance(inputs: &Inputs<'_>, medium: Option<u32>, distance: 
     })
 }
 
-/// A surface that passes a part of the light only is by chance all clear or all glossy: returns what it is, whether it has a
-/// glossy part, and a uniform number.
-pub(super) fn choose_part(material: &Material, u: f64) -> (u32, bool, f64) {
-    let t = f64::from(material.transmission);
+/// A surface that passes a part of the light only is by chance all clear or all glossy: makes it one of them, and returns
+/// whether it has a glossy part, and a uniform number.
+pub(super) fn choose_part(material: &mut Material, u: f64) -> (bool, f64) {
+    let t = f64::from(material.transmission) * (1.0 - f64::from(material.metallic));
     if material.surface != DIELECTRIC || t >= 1.0 {
-        (material.surface, false, u)
-    } else if u < t {
-        (DIELECTRIC, true, u / t)
+        return (false, u);
+    }
+    // Of what isn't clear.
+    material.metallic = (f64::from(material.metallic) / (1.0 - t)).min(1.0) as f32;
+    if u < t {
+        (true, u / t)
     } else {
-        (GLOSSY, true, (u - t) / (1.0 - t))
+        material.surface = GLOSSY;
+        (true, (u - t) / (1.0 - t))
     }
 }

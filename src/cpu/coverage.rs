@@ -52,7 +52,7 @@ struct Side {
 }
 
 impl Side {
-    fn of(surface: &Surface<'_>, direction: DVec3) -> Self {
+    fn of(surface: &Surface, direction: DVec3) -> Self {
         Self {
             object: surface.object,
             front: surface.geometric_normal.dot(direction) < 0.0,

@@ -9,11 +9,12 @@ use rayon::prelude::*;
 use super::camera::SeenSlice;
 use super::environment::{Environment, Sky};
 use super::gloss::Reflector;
-use super::intersect::{Ray, is_blocked, nearest_hit};
+use super::intersect::Ray;
 use super::light::{Arriving, arriving_from, choose_light, emits, is_punctual};
 use super::random::{PathKind, Random};
 use super::sampling::{cosine_direction, decode_direction, triangle_point};
 use super::surface::{offset_origin, reach_of, surface_at};
+use super::texture::{apply_textures, nearest_visible, share_there};
 use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
@@ -33,8 +34,13 @@ pub fn direct<'a>(
         let mut radiance = xyz(point.emitted_normal);
         if inputs.config.direct == Direct::Light && word(point.position_object) != NO_OBJECT {
             let mut random = Random::of_pixel(inputs, PathKind::LightSample, slot as u32, iteration);
-            let (sample, digits) = (random.next4(), random.next4());
-            radiance += sample_direct(inputs, point, seen.reflector(slot), sample, digits);
+            let sample = random.next4();
+            let digits = if inputs.scene.lights.len() > 1 {
+                random.next4()
+            } else {
+                [0.0; 4]
+            };
+            radiance += sample_direct(inputs, point, seen.reflector(slot), sample, digits, &random);
         }
         if radiance.is_finite() {
             (sum.high, sum.low) = to_two_floats(from_two_floats(sum.high, sum.low) + radiance.extend(0.0));
@@ -55,6 +61,7 @@ fn sample_direct(
     gloss: Option<(Reflector, DVec3)>,
     [choice, u, v, way]: [f64; 4],
     [first_digits, _, second_digits, _]: [f64; 4],
+    random: &Random,
 ) -> DVec3 {
     let position = xyz(point.position_object);
     let geometric_normal = decode_direction(word(point.weight_normal));
@@ -74,7 +81,7 @@ fn sample_direct(
     };
     let leaves = |ray: DVec3| ray.dot(geometric_normal) > 0.0 && ray.dot(shading_normal) > 0.0;
     let is_free = |direction: DVec3, end: f64, ignored: Option<u32>| {
-        leaves(direction) && !is_blocked(inputs, Ray { origin, direction }, end, ignored)
+        leaves(direction) && nearest_visible(inputs, Ray { origin, direction }, end, ignored, random).is_none()
     };
     // What a unit of irradiance across a direction adds.
     let response = |direction: DVec3| {
@@ -97,7 +104,8 @@ fn sample_direct(
     };
     let environment = Environment::of(&inputs.scene.environment);
 
-    let emitter = if way < q {
+    let by_bsdf = way < q;
+    let mut emitter = if by_bsdf {
         let direction = match wide {
             Some((reflector, viewer)) if choice < reflections => {
                 reflector.reflected_direction(shading_normal, viewer, [u, v])
@@ -107,7 +115,7 @@ fn sample_direct(
         if !leaves(direction) {
             return DVec3::ZERO;
         }
-        let Some(hit) = nearest_hit(inputs, Ray { origin, direction }, FAR, None) else {
+        let Some(hit) = nearest_visible(inputs, Ray { origin, direction }, FAR, None, random) else {
             return sky(environment.at(direction), direction);
         };
         surface_at(inputs.scene, hit.triangle, hit.u, hit.v)
@@ -146,14 +154,21 @@ fn sample_direct(
     if emitter.light == NO_LIGHT {
         return DVec3::ZERO;
     }
+    apply_textures(inputs.scene, &mut emitter);
+    // A ray that met the light had its chance to pass it.
+    let there = if by_bsdf {
+        1.0
+    } else {
+        share_there(inputs.scene, &emitter)
+    };
     let light = &inputs.scene.lights[emitter.light as usize];
     let to_light = emitter.position - position;
     let direction = to_light.normalize_or_zero();
     let cos_light = -direction.dot(emitter.geometric_normal);
-    if !emits(emitter.material, cos_light > 0.0) || direction.dot(shading_normal) <= 0.0 || cos_light == 0.0 {
+    if !emits(&emitter.material, cos_light > 0.0) || direction.dot(shading_normal) <= 0.0 || cos_light == 0.0 {
         return DVec3::ZERO;
     }
-    let radiance = rgb(emitter.material.emission);
+    let radiance = there * rgb(emitter.material.emission);
     let density = f64::from(light.probability) * to_light.length_squared() / (f64::from(light.area) * cos_light.abs());
     seen(Sky { radiance, density }, direction)
 }

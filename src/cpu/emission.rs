@@ -11,6 +11,7 @@ use super::light::{Choice, choose_light};
 use super::random::Random;
 use super::sampling::{basis, cosine_direction, triangle_point};
 use super::surface::{offset_origin, surface_at};
+use super::texture::{apply_textures, share_there};
 use super::vector::rgb;
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
 
@@ -76,7 +77,8 @@ fn from_triangle(
     side: f64,
 ) -> (Ray, DVec3, Option<u32>) {
     let (u, v) = triangle_point(place.x, place.y);
-    let emitter = surface_at(inputs.scene, light.triangle, u, v);
+    let mut emitter = surface_at(inputs.scene, light.triangle, u, v);
+    apply_textures(inputs.scene, &mut emitter);
     let both_sides = emitter.material.double_sided != 0;
     let normal = if both_sides && side < 0.5 {
         -emitter.geometric_normal
@@ -88,7 +90,8 @@ fn from_triangle(
         origin: offset_origin(emitter.position, normal, emitter.reach),
         direction: cosine_direction(normal, direction.x, direction.y),
     };
-    let flux = rgb(emitter.material.emission) * (PI * sides * f64::from(light.area));
+    let flux =
+        rgb(emitter.material.emission) * (PI * sides * f64::from(light.area) * share_there(inputs.scene, &emitter));
     (ray, flux, Some(light.triangle))
 }
 

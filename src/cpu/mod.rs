@@ -27,6 +27,7 @@ mod resolve;
 mod sampling;
 mod sobol;
 mod surface;
+mod texture;
 mod tiles;
 mod update;
 mod vector;

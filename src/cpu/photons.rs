@@ -6,11 +6,12 @@ use rayon::prelude::*;
 use super::contact::{Encounter, choose_part, transmittance};
 use super::emission::emit;
 use super::gloss::Reflector;
-use super::intersect::{Ray, nearest_hit};
+use super::intersect::Ray;
 use super::light::range_window;
 use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction};
 use super::surface::{Boundary, GLOSSY, MATTE, MIRROR};
+use super::texture::nearest_visible;
 use super::vector::{rgb, with_word};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
@@ -79,13 +80,16 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         inverse_range: emission.inverse_range,
     };
     for _ in 0..settings.max_depth {
-        let Some(hit) = nearest_hit(inputs, path.ray, FAR, path.ignored) else {
+        if path.flux.max_element() <= 0.0 {
+            return;
+        }
+        let Some(hit) = nearest_visible(inputs, path.ray, FAR, path.ignored, &random) else {
             return;
         };
         let incoming = path.ray.direction;
         let met = Encounter::new(inputs, hit, incoming, path.medium);
         let (surface, facing) = (met.surface, met.facing);
-        let material = surface.material;
+        let mut material = surface.material;
         path.flux *= transmittance(inputs, met.through, hit.t);
         // A range is how far the light itself reaches, not what it lights.
         path.flux *= range_window(path.inverse_range, hit.t);
@@ -93,7 +97,8 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             return;
         }
         let mut u = random.next4();
-        let (kind, mixed, rest) = choose_part(material, u[3]);
+        let (mixed, rest) = choose_part(&mut material, u[3]);
+        let kind = material.surface;
         u[3] = rest;
         let [choice, second, survival, _] = u;
         let scatters = [MATTE, GLOSSY].contains(&kind);
@@ -118,7 +123,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             let outgoing = cosine_direction(facing.geometric_normal, choice, second);
             let (outgoing, weight) = if kind == GLOSSY {
-                facing.scatter(&Reflector::of_material(material), incoming, u, outgoing)
+                facing.scatter(&Reflector::of_material(&material), incoming, u, outgoing)
             } else {
                 (outgoing, rgb(material.base_color))
             };
@@ -131,7 +136,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             let reflected = path.flux * facing.mirror_reflectance(material.base_color, incoming);
             (facing.reflect(incoming), roulette(path.flux, reflected, survival))
         } else {
-            let boundary = Boundary::new(&facing, incoming, material, met.outside, [u[1], u[3]]);
+            let boundary = Boundary::new(&facing, incoming, &material, met.outside, [u[1], u[3]]);
             let (direction, weight, side) = match boundary.refracted {
                 Some(refracted) if choice >= boundary.reflectance => {
                     (refracted, met.tint * boundary.refracted_weight, met.beyond)

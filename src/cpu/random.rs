@@ -97,6 +97,13 @@ impl Random {
         }
     }
 
+    /// Decides whether a ray passes the surface of this number that isn't there everywhere.
+    pub fn of_passage(&self, number: u32) -> f64 {
+        let dimension = self.dimension.wrapping_add(number << 16);
+        let [word, ..] = pcg4d([self.path ^ 0x616c_7068, self.iteration, self.seed, dimension]);
+        f64::from(word >> 8) / f64::from(1 << 24)
+    }
+
     /// The next four numbers, uniform in [0, 1): multiples of 2⁻²⁴, so that an f32 holds each of them.
     pub fn next4(&mut self) -> [f64; 4] {
         let bits = match self.sampler {

@@ -22,9 +22,11 @@ pub(super) const GLOSSY: u32 = 3;
 
 /// A point of a triangle.
 #[derive(Clone, Copy)]
-pub(super) struct Surface<'a> {
+pub(super) struct Surface {
     /// Index of the triangle.
     pub triangle: u32,
+    /// Barycentric coordinates of its second and third corner.
+    pub uv: [f64; 2],
     pub position: DVec3,
     /// Largest coordinates of the triangle's corners, without their signs.
     pub reach: DVec3,
@@ -33,7 +35,8 @@ pub(super) struct Surface<'a> {
     /// On the same side.
     pub shading_normal: DVec3,
     pub object: u32,
-    pub material: &'a Material,
+    /// Without its textures, until [`super::texture::apply_textures`].
+    pub material: Material,
     /// Its index.
     pub material_index: u32,
     /// Index of its light, or [`crate::layout::NO_LIGHT`].
@@ -43,25 +46,26 @@ pub(super) struct Surface<'a> {
 }
 
 /// The point with the barycentric coordinates `u` and `v` of the second and the third corner.
-pub(super) fn surface_at(scene: &PackedScene, index: u32, u: f64, v: f64) -> Surface<'_> {
+pub(super) fn surface_at(scene: &PackedScene, index: u32, u: f64, v: f64) -> Surface {
     let triangle = &scene.shading_triangles[index as usize];
     let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(xyz);
     let geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
     Surface {
         triangle: index,
+        uv: [u, v],
         position: p0 + u * (p1 - p0) + v * (p2 - p0),
         reach: p0.abs().max(p1.abs()).max(p2.abs()),
         geometric_normal,
         shading_normal: interpolated_normal(triangle, u, v, geometric_normal),
         object: triangle.object,
-        material: &scene.materials[triangle.material as usize],
+        material: scene.materials[triangle.material as usize],
         material_index: triangle.material,
         light: triangle.light,
         flags: triangle.flags,
     }
 }
 
-impl Surface<'_> {
+impl Surface {
     /// Where a ray starts that leaves in `direction`: on the side that it flies to.
     pub fn origin_towards(&self, direction: DVec3) -> DVec3 {
         let n = self.geometric_normal;
@@ -111,7 +115,7 @@ pub(super) struct Facing {
 }
 
 impl Facing {
-    pub fn new(surface: &Surface<'_>, incoming: DVec3) -> Self {
+    pub fn new(surface: &Surface, incoming: DVec3) -> Self {
         let front = incoming.dot(surface.geometric_normal) < 0.0;
         let side = if front { 1.0 } else { -1.0 };
         let geometric_normal = side * surface.geometric_normal;

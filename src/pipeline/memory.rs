@@ -63,7 +63,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
 }
 
 /// The buffers that hold the scene.
-pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 7] {
+pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 10] {
     [
         (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
         (BufferId::HavelTriangles, bytemuck::cast_slice(&scene.havel_triangles)),
@@ -72,6 +72,9 @@ pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 7] {
             bytemuck::cast_slice(&scene.shading_triangles),
         ),
         (BufferId::Materials, bytemuck::cast_slice(&scene.materials)),
+        (BufferId::Corners, bytemuck::cast_slice(&scene.corners)),
+        (BufferId::Textures, bytemuck::cast_slice(&scene.textures)),
+        (BufferId::Texels, bytemuck::cast_slice(&scene.texels)),
         (BufferId::Lights, bytemuck::cast_slice(&scene.lights)),
         (BufferId::Environment, bytemuck::cast_slice(&scene.environment)),
         (BufferId::ObjectGrids, bytemuck::cast_slice(&scene.object_grids)),

@@ -75,6 +75,14 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8
     Ok(bytes)
 }
 
+/// The bytes that the uri of an image stands for.
+pub(super) fn read_uri(uri: &str, folder: &Path) -> Check<Vec<u8>> {
+    match uri.strip_prefix("data:") {
+        Some(data) => decode_data_uri(data),
+        None => read_file(&folder.join(relative_path(uri)?), MAX_TOTAL_SIZE),
+    }
+}
+
 /// `length` bytes from byte `start`, if there are as many.
 pub(super) fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
     let end = usize::try_from(start.checked_add(length)?).ok()?;
@@ -84,11 +92,11 @@ pub(super) fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
 /// Reads the first `length` bytes of a file, or all where it is shorter.
 fn read_file(path: &Path, length: u64) -> Check<Vec<u8>> {
     let place = quote(&path.to_string_lossy());
-    let unreadable = |error| format!("{place} can't be read ({error}); put the buffer's file there");
+    let unreadable = |error| format!("{place} can't be read ({error}); put the file there");
     // Opening a pipe would wait for a writer, and a device may have no end: ask before.
     let metadata = fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
-        return Err(format!("{place} isn't a file; put the buffer's file there"));
+        return Err(format!("{place} isn't a file; put the file there"));
     }
     let mut bytes = Vec::new();
     File::open(path)
@@ -112,7 +120,7 @@ fn decode_data_uri(data: &str) -> Check<Vec<u8>> {
 
 /// The path that a relative URI names, checked to stay in the scene file's folder or below.
 fn relative_path(uri: &str) -> Check<PathBuf> {
-    let advice = "put the buffer's file beside the scene and refer to it by a relative path";
+    let advice = "put the file beside the scene and refer to it by a relative path";
     if let Some((scheme, _)) = uri.split_once(':')
         && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
         && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))

@@ -1,7 +1,8 @@
 //! What of the renderer a scene needs: the kernels are specialised for it and have no code for the rest.
 
 use crate::layout::{
-    DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT, ShadingTriangle, TOUCHED,
+    DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH, SPOT_LIGHT,
+    ShadingTriangle, TEXTURED, TOUCHED,
 };
 
 /// [`Material::surface`] of a mirror.
@@ -34,6 +35,10 @@ pub struct SceneFeatures {
     pub punctual: bool,
     /// An environment.
     pub environment: bool,
+    /// Textures, or colours of corners.
+    pub textured: bool,
+    /// Surfaces that aren't there everywhere.
+    pub alpha: bool,
 }
 
 impl SceneFeatures {
@@ -49,6 +54,8 @@ impl SceneFeatures {
         contact: true,
         punctual: true,
         environment: true,
+        textured: true,
+        alpha: true,
     };
 
     /// The features of what is seen, of materials that triangles have, and of the lights.
@@ -57,7 +64,10 @@ impl SceneFeatures {
         for triangle in triangles {
             let material = &materials[triangle.material as usize];
             let glass = material.surface == DIELECTRIC;
-            let mixed = glass && material.transmission < 1.0;
+            // Textures make less of a factor.
+            let varies = |texture: u32| texture != NO_TEXTURE;
+            let clear = material.transmission == 1.0 && material.metallic == 0.0;
+            let mixed = glass && (!clear || varies(material.transmission_texture));
             features.mirror |= material.surface == MIRROR;
             features.dielectric |= glass;
             features.glossy |= material.surface == GLOSSY || mixed;
@@ -65,6 +75,8 @@ impl SceneFeatures {
             features.thin_walls |= glass && material.thin != 0;
             features.partly_clear |= mixed;
             features.absorption |= glass && material.absorption != [0.0; 3];
+            features.textured |= triangle.flags & TEXTURED != 0;
+            features.alpha |= triangle.flags & SEE_THROUGH != 0;
             features.contact |= triangle.flags & TOUCHED != 0;
         }
         for light in lights {
@@ -75,7 +87,7 @@ impl SceneFeatures {
     }
 
     /// Each feature's constant in the kernels, and its value.
-    pub fn constants(self) -> [(&'static str, bool); 10] {
+    pub fn constants(self) -> [(&'static str, bool); 12] {
         [
             ("MIRRORS", self.mirror),
             ("DIELECTRICS", self.dielectric),
@@ -87,6 +99,8 @@ impl SceneFeatures {
             ("CONTACT", self.contact),
             ("PUNCTUAL_LIGHTS", self.punctual),
             ("ENVIRONMENT", self.environment),
+            ("TEXTURED", self.textured),
+            ("ALPHA", self.alpha),
         ]
     }
 

@@ -9,6 +9,7 @@ use super::diagnostic::{Check, Warnings, quote};
 use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::graph::place_nodes;
 use super::punctual::punctual_lights;
+use super::texture::TextureReader;
 use super::{Environment, Scene, Surface, camera, geometry, material};
 use crate::error::{Error, Result};
 
@@ -63,7 +64,8 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     for object in &geometry.objects {
         used[object.material as usize] = true;
     }
-    let mut materials = material::materials(root, &used, &mut warnings)?;
+    let mut textures = TextureReader::new(&document, path.parent().unwrap_or(Path::new("")));
+    let mut materials = material::materials(root, &used, &mut textures, &mut warnings)?;
     if used.last() == Some(&false) {
         materials.pop();
     }
@@ -86,6 +88,7 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         materials,
         lights: punctual_lights(root, &nodes, geometry.normalisation, &mut warnings)?,
         environment: options.environment,
+        textures: textures.finish(),
         cameras,
         normalisation: geometry.normalisation,
         dropped_triangles: geometry.dropped_triangles,

@@ -4,10 +4,12 @@ use glam::Vec3;
 use gltf::json;
 use gltf::json::extensions::material::Volume;
 use gltf::json::material::AlphaMode;
+use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 
-use super::diagnostic::{Check, Warnings, damaged, label, list, shorten};
-use super::{Dielectric, Gloss, Material, Surface};
+use super::diagnostic::{Check, Warnings, damaged, label, shorten};
+use super::texture::{TextureReader, TextureUse};
+use super::{Alpha, Dielectric, Gloss, Material, MaterialTextures, Surface};
 
 /// Index of refraction where the file gives none.
 const DEFAULT_IOR: f32 = 1.5;
@@ -18,7 +20,12 @@ const MAX_IOR: f32 = 100.0;
 /// Converts every material of the file, and the default material after them.
 ///
 /// Only those that `used` marks (one flag for each, the default's last) give rise to warnings.
-pub(super) fn materials(root: &json::Root, used: &[bool], warnings: &mut Warnings) -> Check<Vec<Material>> {
+pub(super) fn materials(
+    root: &json::Root,
+    used: &[bool],
+    textures: &mut TextureReader<'_>,
+    warnings: &mut Warnings,
+) -> Check<Vec<Material>> {
     let default = json::Material {
         name: Some("default".into()),
         ..Default::default()
@@ -30,8 +37,9 @@ pub(super) fn materials(root: &json::Root, used: &[bool], warnings: &mut Warning
             warnings: Vec::new(),
         };
         let label = label("material", index, json.name.as_deref());
-        let material = reader.read(index).map_err(|what| format!("{label}: {what}"))?;
+        let mut material = reader.read(index).map_err(|what| format!("{label}: {what}"))?;
         if used[index] {
+            material.textures = reader.textures(textures).map_err(|what| format!("{label}: {what}"))?;
             for warning in reader.warnings {
                 warnings.push(format!("{label}: {warning}"));
             }
@@ -49,13 +57,8 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn read(&mut self, index: usize) -> Check<Material> {
-        self.warn_of_textures();
-        match self.json.alpha_mode {
-            Checked::Valid(AlphaMode::Opaque) => {}
-            Checked::Valid(mode) => self.warn(format!("alphaMode {mode:?} isn't supported yet; it is rendered opaque")),
-            Checked::Invalid => return Err(damaged("its alphaMode is none of OPAQUE, MASK and BLEND")),
-        }
-        let [red, green, blue, _] = self.json.pbr_metallic_roughness.base_color_factor.0;
+        let [red, green, blue, alpha] = self.json.pbr_metallic_roughness.base_color_factor.0;
+        let [alpha] = self.fractions("alpha of its baseColorFactor", [alpha])?;
         let base_color = self.fractions("baseColorFactor", [red, green, blue])?;
         Ok(Material {
             name: match &self.json.name {
@@ -66,6 +69,16 @@ impl Reader<'_> {
             base_color: base_color.into(),
             emission: self.emission()?,
             double_sided: self.json.double_sided,
+            alpha: match self.json.alpha_mode {
+                Checked::Valid(AlphaMode::Opaque) => Alpha::Opaque,
+                Checked::Valid(AlphaMode::Mask) => Alpha::Mask {
+                    alpha,
+                    cutoff: self.json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0),
+                },
+                Checked::Valid(AlphaMode::Blend) => Alpha::Blend { alpha },
+                Checked::Invalid => return Err(damaged("its alphaMode is none of OPAQUE, MASK and BLEND")),
+            },
+            textures: MaterialTextures::default(),
         })
     }
 
@@ -81,26 +94,28 @@ impl Reader<'_> {
         let (specular, specular_color) = self.specular()?;
         self.check_volume()?;
 
-        if metallic == 1.0 && transmission > 0.0 {
+        // A texture may make less of a factor, and other things from place to place.
+        let textured = pbr.metallic_roughness_texture.is_some();
+        let all_metal = metallic == 1.0 && !textured;
+        if all_metal && transmission > 0.0 {
             self.warn("metallicFactor 1 leaves nothing of its transmission; set it to 0 for glass".into());
         }
-        if metallic == 1.0 && roughness == 0.0 {
+        if all_metal && roughness == 0.0 {
             return Ok(Surface::Mirror);
         }
-        let clear = transmission * (1.0 - metallic);
-        if clear == 0.0 && metallic == 0.0 && specular == 0.0 {
+        let is_clear = transmission > 0.0 && !all_metal;
+        if !is_clear && metallic == 0.0 && specular == 0.0 {
             return Ok(Surface::Matte);
         }
         // KHR_materials_ior and KHR_materials_specular.
         let of_ior = ((ior - 1.0) / (ior + 1.0)).powi(2);
         let gloss = Gloss {
-            // Of what isn't clear.
-            metallic: if clear < 1.0 { metallic / (1.0 - clear) } else { 0.0 },
+            metallic,
             roughness,
             specular_f0: (specular_color * of_ior).min(Vec3::ONE) * specular,
             specular_f90: specular,
         };
-        if clear == 0.0 {
+        if !is_clear {
             return Ok(Surface::Glossy(gloss));
         }
         self.warn_of_glass();
@@ -109,7 +124,7 @@ impl Reader<'_> {
         Ok(Surface::Dielectric(Dielectric {
             ior,
             roughness,
-            transmission: clear,
+            transmission,
             gloss,
             thin,
             absorption: volume.filter(|_| !thin).map_or(Vec3::ZERO, absorption),
@@ -181,42 +196,61 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Names the textures. Not the thickness's: it is for renderers that don't trace through the solid.
-    fn warn_of_textures(&mut self) {
+    /// The textures. Not the thickness's: it is for renderers that don't trace through the solid.
+    fn textures(&mut self, reader: &mut TextureReader<'_>) -> Check<MaterialTextures> {
         let json = self.json;
         let pbr = &json.pbr_metallic_roughness;
         let transmission = self.extension(|extensions| extensions.transmission.as_ref());
         let specular = self.extension(|extensions| extensions.specular.as_ref());
-        let slots = [
-            ("baseColorTexture", pbr.base_color_texture.is_some()),
-            ("metallicRoughnessTexture", pbr.metallic_roughness_texture.is_some()),
-            ("normalTexture", json.normal_texture.is_some()),
-            ("occlusionTexture", json.occlusion_texture.is_some()),
-            ("emissiveTexture", json.emissive_texture.is_some()),
-            (
-                "transmissionTexture",
-                transmission.is_some_and(|transmission| transmission.transmission_texture.is_some()),
-            ),
-            (
-                "specularTexture",
-                specular.is_some_and(|specular| specular.specular_texture.is_some()),
-            ),
-            (
-                "specularColorTexture",
-                specular.is_some_and(|specular| specular.specular_color_texture.is_some()),
-            ),
+        let linear = |info: &Info| used(info, false);
+        let color = |info: &Info| used(info, true);
+        let normal = match &json.normal_texture {
+            None => None,
+            Some(texture) => {
+                let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
+                let transform = others.and_then(|others| others.get("KHR_texture_transform")).cloned();
+                let transform = transform.map(serde_json::from_value).transpose();
+                Some(TextureUse {
+                    texture: texture.index.value(),
+                    set: texture.tex_coord,
+                    transform: transform.map_err(|error| damaged(format_args!("its normalTexture: {error}")))?,
+                    srgb: false,
+                })
+            }
+        };
+        let uses = [
+            pbr.base_color_texture.as_ref().map(color),
+            pbr.metallic_roughness_texture.as_ref().map(linear),
+            normal,
+            json.emissive_texture.as_ref().map(color),
+            transmission.and_then(|it| it.transmission_texture.as_ref()).map(linear),
+            specular.and_then(|it| it.specular_texture.as_ref()).map(linear),
+            specular.and_then(|it| it.specular_color_texture.as_ref()).map(color),
         ];
-        let present: Vec<String> = slots
-            .into_iter()
-            .filter(|(_, is_present)| *is_present)
-            .map(|(slot, _)| slot.to_owned())
-            .collect();
-        if !present.is_empty() {
-            self.warn(format!(
-                "textures aren't supported yet; the factors are used without {}",
-                list(&present)
-            ));
+        let mut found = [None; 7];
+        for (found, wanted) in found.iter_mut().zip(&uses) {
+            if let Some(wanted) = wanted {
+                *found = reader.lookup(wanted, &mut self.warnings)?;
+            }
         }
+        let [
+            base_color,
+            metallic_roughness,
+            normal,
+            emission,
+            transmission,
+            specular,
+            specular_color,
+        ] = found;
+        Ok(MaterialTextures {
+            base_color,
+            metallic_roughness,
+            normal: normal.map(|index| (index, json.normal_texture.as_ref().map_or(1.0, |texture| texture.scale))),
+            emission,
+            transmission,
+            specular,
+            specular_color,
+        })
     }
 
     fn extension<'s, T>(
@@ -237,6 +271,18 @@ impl Reader<'_> {
 
     fn warn(&mut self, warning: String) {
         self.warnings.push(warning);
+    }
+}
+
+fn used(info: &Info, srgb: bool) -> TextureUse {
+    TextureUse {
+        texture: info.index.value(),
+        set: info.tex_coord,
+        transform: info
+            .extensions
+            .as_ref()
+            .and_then(|extensions| extensions.texture_transform.clone()),
+        srgb,
     }
 }
 

@@ -21,6 +21,7 @@ mod features;
 mod geometry;
 mod glb;
 mod graph;
+mod image;
 mod instance;
 mod light;
 mod light_table;
@@ -34,12 +35,14 @@ mod primitive;
 mod punctual;
 mod skin;
 mod tangents;
+mod texture;
 
 pub use features::SceneFeatures;
 #[cfg(test)]
 pub(crate) use light_table::set_alias_table;
 pub use load::LoadOptions;
 pub use packed::PackedScene;
+pub use texture::Textures;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
@@ -83,7 +86,7 @@ pub struct Dielectric {
     pub ior: f32,
     /// Its square is GGX's α; 0 ..= 1.
     pub roughness: f32,
-    /// Share of the surface that passes light, 0 ..= 1.
+    /// Share of what is no metal that passes light, 0 ..= 1.
     pub transmission: f32,
     /// How the rest reflects.
     pub gloss: Gloss,
@@ -120,6 +123,44 @@ pub struct Gloss {
     pub specular_f90: f32,
 }
 
+/// Where a surface is there at all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Alpha {
+    /// Everywhere.
+    Opaque,
+    /// Where alpha, with texture and corners' colours, is at least the cutoff.
+    Mask {
+        /// Factor.
+        alpha: f32,
+        /// The least.
+        cutoff: f32,
+    },
+    /// With alpha as probability.
+    Blend {
+        /// Factor.
+        alpha: f32,
+    },
+}
+
+/// Indices into [`Textures::lookups`] of what a material's factors are multiplied with.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MaterialTextures {
+    /// Base colour, and alpha.
+    pub base_color: Option<u32>,
+    /// Roughness in green, metal in blue.
+    pub metallic_roughness: Option<u32>,
+    /// Normals, and how far they lean.
+    pub normal: Option<(u32, f32)>,
+    /// Emission.
+    pub emission: Option<u32>,
+    /// Transmission in red.
+    pub transmission: Option<u32>,
+    /// Reflectance at both angles in alpha.
+    pub specular: Option<u32>,
+    /// Reflectance at normal incidence.
+    pub specular_color: Option<u32>,
+}
+
 /// A glTF material, reduced to what is supported.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
@@ -133,6 +174,10 @@ pub struct Material {
     pub emission: Vec3,
     /// Whether the back side emits as well. (Every surface scatters on both sides.)
     pub double_sided: bool,
+    /// Where it is there.
+    pub alpha: Alpha,
+    /// Its textures.
+    pub textures: MaterialTextures,
 }
 
 /// One primitive of one mesh instance: the unit within which photons and visible points meet.
@@ -202,6 +247,8 @@ pub struct Scene {
     pub lights: Vec<PunctualLight>,
     /// What shines from afar.
     pub environment: Option<Environment>,
+    /// Their textures.
+    pub textures: Textures,
     /// Cameras; at least one.
     pub cameras: Vec<Camera>,
     /// How render space lies in world space.

@@ -1,13 +1,15 @@
 //! A scene in the layout of the device.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::object_grid::object_grids;
-use super::{Dielectric, Environment, Gloss, Scene, Surface, bvh, contact, environment, light_table};
+use super::{
+    Alpha, Dielectric, Environment, Gloss, MaterialTextures, Scene, Surface, bvh, contact, environment, light_table,
+};
 use crate::layout::{
-    BvhRecord, ENVIRONMENT_LIGHT, HavelTriangle, Light, Material, NO_LIGHT, ObjectGrid, SMOOTH_SHADED, ShadingTriangle,
-    TOUCHED, TRIANGLE_LIGHT,
+    BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Light, MASK, Material, NO_LIGHT, NO_TEXTURE, OPAQUE,
+    ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED, TOUCHED, TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// What the ray stages read, in the order of the BVH's leaves.
@@ -21,6 +23,12 @@ pub struct PackedScene {
     pub shading_triangles: Vec<ShadingTriangle>,
     /// Materials.
     pub materials: Vec<Material>,
+    /// What their corners have for textures, three to a triangle; none where nothing is textured.
+    pub corners: Vec<Corner>,
+    /// Textures.
+    pub textures: Vec<TextureLookup>,
+    /// Texels of their images, RGBA bytes, four by four.
+    pub texels: Vec<[u32; 4]>,
     /// What the kernels need to know.
     pub features: SceneFeatures,
     /// Lights.
@@ -71,10 +79,18 @@ impl PackedScene {
         for (triangle, touched) in shading_triangles.iter_mut().zip(touched) {
             triangle.flags |= if touched { TOUCHED } else { 0 };
         }
+        let features = SceneFeatures::of(&shading_triangles, &materials, &lights);
         let (object_grids, object_cells) = object_grids(scene);
         Ok(Self {
             power,
-            features: SceneFeatures::of(&shading_triangles, &materials, &lights),
+            corners: if features.textured {
+                texture_corners(scene, &bvh.order)
+            } else {
+                Vec::new()
+            },
+            textures: scene.textures.lookups.clone(),
+            texels: texels(&scene.textures.texels),
+            features,
             object_grids,
             object_cells,
             havel_triangles: corners.iter().map(havel_triangle).collect(),
@@ -122,13 +138,25 @@ fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTr
         let p = corners[i];
         [p.x, p.y, p.z, f32::from_bits(encode_direction(normals[i]))]
     };
+    let material = &scene.materials[scene.objects[triangle.object as usize].material as usize];
+    let colored = triangle.vertices.iter().any(|&vertex| {
+        let color = scene.colors.get(vertex as usize);
+        color.is_some_and(|color| *color != Vec4::ONE)
+    });
+    let textured = colored || material.textures != MaterialTextures::default();
     ShadingTriangle {
         p0: vertex(0),
         p1: vertex(1),
         p2: vertex(2),
         object: triangle.object,
         material: scene.objects[triangle.object as usize].material,
-        flags: if smooth_shaded { SMOOTH_SHADED } else { 0 },
+        flags: if smooth_shaded { SMOOTH_SHADED } else { 0 }
+            | if textured { TEXTURED } else { 0 }
+            | if material.alpha == Alpha::Opaque {
+                0
+            } else {
+                SEE_THROUGH
+            },
         light: NO_LIGHT,
     }
 }
@@ -141,6 +169,12 @@ fn material(material: &super::Material) -> Material {
         Surface::Glossy(gloss) => (GLOSSY, None, gloss),
     };
     let inside = glass.unwrap_or(Dielectric::clear(1.0));
+    let textures = &material.textures;
+    let (alpha_mode, alpha, alpha_cutoff) = match material.alpha {
+        Alpha::Opaque => (OPAQUE, 1.0, 0.0),
+        Alpha::Mask { alpha, cutoff } => (MASK, alpha, cutoff),
+        Alpha::Blend { alpha } => (BLEND, alpha, 0.0),
+    };
     Material {
         base_color: material.base_color.to_array(),
         surface,
@@ -154,7 +188,58 @@ fn material(material: &super::Material) -> Material {
         specular_f90: gloss.specular_f90,
         absorption: inside.absorption.to_array(),
         thin: inside.thin.into(),
+        color_texture: textures.base_color.unwrap_or(NO_TEXTURE),
+        metal_texture: textures.metallic_roughness.unwrap_or(NO_TEXTURE),
+        normal_texture: textures.normal.map_or(NO_TEXTURE, |(texture, _)| texture),
+        emission_texture: textures.emission.unwrap_or(NO_TEXTURE),
+        transmission_texture: textures.transmission.unwrap_or(NO_TEXTURE),
+        specular_texture: textures.specular.unwrap_or(NO_TEXTURE),
+        specular_color_texture: textures.specular_color.unwrap_or(NO_TEXTURE),
+        normal_scale: textures.normal.map_or(0.0, |(_, scale)| scale),
+        alpha_mode,
+        alpha_cutoff,
+        alpha,
+        padding: 0,
     }
+}
+
+fn texture_corners(scene: &Scene, order: &[u32]) -> Vec<Corner> {
+    let vertices = order.iter().flat_map(|&index| scene.triangles[index as usize].vertices);
+    let corner = |vertex: u32| {
+        let vertex = vertex as usize;
+        let [first, second] = scene.texcoords.get(vertex).copied().unwrap_or_default();
+        let color = scene.colors.get(vertex).copied().unwrap_or(Vec4::ONE).to_array();
+        let [r, g, b, a] = color.map(|value| u32::from(half::f16::from_f32(value.min(65_504.0)).to_bits()));
+        let tangent = scene.tangents.get(vertex).copied().unwrap_or_default();
+        let bitangent = if tangent.w == 0.0 { 0.0 } else { tangent.w.signum() };
+        Corner {
+            first: first.to_array(),
+            second: second.to_array(),
+            color: [r | g << 16, b | a << 16],
+            tangent: if bitangent == 0.0 {
+                0
+            } else {
+                encode_direction(tangent.truncate())
+            },
+            bitangent,
+        }
+    };
+    vertices.map(corner).collect()
+}
+
+fn texels(texels: &[u32]) -> Vec<[u32; 4]> {
+    let (whole, rest) = texels.as_chunks::<4>();
+    let mut last = [0; 4];
+    last[..rest.len()].copy_from_slice(rest);
+    [
+        whole,
+        if rest.is_empty() {
+            &[]
+        } else {
+            std::slice::from_ref(&last)
+        },
+    ]
+    .concat()
 }
 
 /// About the chance that a direction of the BSDF meets a light: the part of the scene's area that emits, or of all directions

@@ -1,7 +1,7 @@
 //! A mesh primitive as a list of triangles, whatever its topology and index type.
 
 use glam::Vec4;
-use gltf::json::mesh::{Mode, Semantic};
+use gltf::json::mesh::Mode;
 use gltf::json::validation::Checked;
 use gltf::json::{Mesh, Root, mesh};
 
@@ -76,7 +76,6 @@ impl<'a> Primitive<'a> {
             }
         })?;
 
-        warn_of_ignored(primitive, label, warnings);
         let mut opened = Self {
             material,
             attributes,
@@ -182,11 +181,4 @@ fn check_draco(root: &Root, primitive: &mesh::Primitive) -> Check<()> {
         ));
     }
     Ok(())
-}
-
-fn warn_of_ignored(primitive: &mesh::Primitive, label: &str, warnings: &mut Warnings) {
-    let is_color = |semantic: &Checked<Semantic>| matches!(semantic, Checked::Valid(Semantic::Colors(_)));
-    if primitive.attributes.keys().any(is_color) {
-        warnings.push(format!("{label}: its vertex colours aren't rendered yet"));
-    }
 }

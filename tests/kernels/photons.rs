@@ -108,6 +108,11 @@ fn photons_that_microfacets_scatter_land_where_the_cpus_do() {
 }
 
 #[test]
+fn photons_in_a_scene_of_textures_land_where_the_cpus_do() {
+    assert_photons_agree("textures", photons_carry_all_light(), 1e-4, 0.995, 7000);
+}
+
+#[test]
 fn photons_of_every_kind_of_light_land_where_the_cpus_do() {
     for name in ["cornell-spheres, lit", "ring, lit", "glasses, lit"] {
         // Many of the environment's meet nothing.

@@ -75,6 +75,7 @@ fn camera_paths_end_where_the_cpus_end() {
         "ring",
         "glossy",
         "glasses",
+        "textures",
         "ring, lit",
         "glasses, lit",
     ] {

@@ -184,7 +184,7 @@ fn negative_and_infinite_factors_are_refused() {
 fn what_is_rendered_otherwise_is_named_in_a_warning() {
     let mut metal_glass = glass(json!({}));
     metal_glass["pbrMetallicRoughness"]["metallicFactor"] = json!(1);
-    let cases: [(Value, &[&str]); 5] = [
+    let cases: [(Value, &[&str]); 3] = [
         (metal_glass, &["metallicFactor 1", "transmission"]),
         (
             glass(json!({"KHR_materials_specular": {"specularFactor": 0.5}})),
@@ -194,8 +194,6 @@ fn what_is_rendered_otherwise_is_named_in_a_warning() {
             glass(json!({"KHR_materials_ior": {"ior": 0}})),
             &["index of refraction of 0", "1.5 is used"],
         ),
-        (matte(json!({"alphaMode": "MASK"})), &["alphaMode Mask", "opaque"]),
-        (matte(json!({"alphaMode": "BLEND"})), &["alphaMode Blend", "opaque"]),
     ];
     for (material, parts) in cases {
         let parts = [&["material 0 \"floor\""], parts].concat();
@@ -233,12 +231,11 @@ fn glass_may_be_rough_a_thin_wall_a_part_of_a_surface_and_absorbing() {
     });
     assert!(dielectric(&loaded(without_volume)).thin);
 
-    // Of half a metal that passes half of the rest, a quarter is clear and two thirds of the other parts are metal.
+    // The kernels mix metal and transmission: textures may change both.
     let mut half = glass(json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}}));
     half["pbrMetallicRoughness"]["metallicFactor"] = json!(0.5);
     let half = dielectric(&loaded(half));
-    assert_eq!(half.transmission, 0.25);
-    assert!((half.gloss.metallic - 2.0 / 3.0).abs() < 1e-6, "{half:?}");
+    assert_eq!((half.transmission, half.gloss.metallic), (0.5, 0.5));
 
     let absorbing = json!({"thicknessFactor": 1, "attenuationColor": [1, 0.5, 0], "attenuationDistance": 2});
     let absorbing = floor_of(glass(json!({"KHR_materials_volume": absorbing}))).scene();
@@ -253,35 +250,6 @@ fn absorption_that_absorbs_nothing_is_no_reason_to_warn() {
     loaded(glass(json!({"KHR_materials_volume": volume})));
     let volume = json!({"thicknessFactor": 1, "attenuationDistance": 2});
     loaded(glass(json!({"KHR_materials_volume": volume})));
-}
-
-#[test]
-fn textures_of_any_slot_are_named_in_one_warning() {
-    let texture = json!({"index": 0});
-    let mut textured = matte(json!({
-        "normalTexture": texture, "occlusionTexture": texture, "emissiveTexture": texture
-    }));
-    textured["pbrMetallicRoughness"]["baseColorTexture"] = texture.clone();
-    textured["pbrMetallicRoughness"]["metallicRoughnessTexture"] = texture.clone();
-    textured["extensions"]["KHR_materials_transmission"] = json!({"transmissionTexture": texture});
-    textured["extensions"]["KHR_materials_specular"] = json!({
-        "specularFactor": 0, "specularTexture": texture, "specularColorTexture": texture
-    });
-    let mut room = floor_of(textured);
-    room.set("/textures", json!([{"source": 0}]));
-    room.set("/images", json!([{"uri": "absent.png"}]));
-    room.assert_warns(&[
-        "material 0 \"floor\"",
-        "textures",
-        "baseColorTexture",
-        "metallicRoughnessTexture",
-        "normalTexture",
-        "occlusionTexture",
-        "emissiveTexture",
-        "transmissionTexture",
-        "specularTexture",
-        "specularColorTexture",
-    ]);
 }
 
 /// KHR_materials_ior and KHR_materials_specular; metal is mixed in by the kernels.
@@ -325,10 +293,6 @@ fn an_unknown_alpha_mode_is_refused() {
 
 #[test]
 fn parts_of_meshes_and_nodes_that_are_left_out_are_named() {
-    let mut room = Fixture::room();
-    room.set("/meshes/0/primitives/0/attributes/COLOR_0", json!(1));
-    room.assert_warns(&["mesh 0 \"floor\", primitive 0", "vertex colours"]);
-
     let mut room = Fixture::room();
     let sampler = json!({"input": 0, "output": 0});
     let channel = json!({"sampler": 0, "target": {"node": 0, "path": "translation"}});

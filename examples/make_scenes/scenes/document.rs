@@ -10,7 +10,32 @@ const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 const UNSIGNED_SHORT: u32 = 5123;
 const FLOAT: u32 = 5126;
 const NEAREST: u32 = 9728;
+const LINEAR: u32 = 9729;
 const REPEAT: u32 = 10497;
+
+/// How texels become a value; the number of the sampler.
+#[derive(Clone, Copy)]
+pub enum Filter {
+    Nearest = 0,
+    Linear = 1,
+}
+
+/// An image of this size as PNG, by a formula for its texels, RGBA.
+pub fn png(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Vec<u8> {
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbaImage::from_fn(width, height, |x, y| image::Rgba(texel(x, y)))
+        .write_to(&mut png, image::ImageFormat::Png)
+        .expect("memory takes any PNG");
+    png.into_inner()
+}
+
+/// `material` with a texture in a slot, such as `/normalTexture`.
+pub fn with_texture(mut material: Value, slot: &str, texture: usize) -> Value {
+    let (parent, name) = slot.rsplit_once('/').expect("a path");
+    let parent = material.pointer_mut(parent).expect("the slot's object");
+    parent[name] = json!({ "index": texture });
+    material
+}
 
 /// A file to write: its name in the scenes' folder, and its content.
 pub struct File {
@@ -102,7 +127,8 @@ pub struct Document {
     lights: Vec<Value>,
     accessors: Vec<Value>,
     buffer_views: Vec<Value>,
-    texture: Option<Value>,
+    images: Vec<Value>,
+    textures: Vec<Value>,
     buffer: Vec<u8>,
 }
 
@@ -118,7 +144,8 @@ impl Document {
             lights: Vec::new(),
             accessors: Vec::new(),
             buffer_views: Vec::new(),
-            texture: None,
+            images: Vec::new(),
+            textures: Vec::new(),
             buffer: Vec::new(),
         }
     }
@@ -128,12 +155,14 @@ impl Document {
         push(&mut self.materials, material)
     }
 
-    /// Adds a matte material whose albedo is the document's one texture, a PNG, repeated without filtering.
-    pub fn textured(&mut self, name: &str, png: &[u8]) -> usize {
-        self.texture = Some(json!({ "bufferView": self.view(png, None), "mimeType": "image/png" }));
-        let mut material = matte(name, [1.0; 3]);
-        material["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": 0 });
-        self.material(material)
+    /// Adds a texture, a PNG that repeats, and returns its index.
+    pub fn texture(&mut self, png: &[u8], filter: Filter) -> usize {
+        let view = self.view(png, None);
+        let source = push(&mut self.images, json!({ "bufferView": view, "mimeType": "image/png" }));
+        push(
+            &mut self.textures,
+            json!({ "sampler": filter as usize, "source": source }),
+        )
     }
 
     /// Adds a mesh and a node that shows it.
@@ -203,11 +232,12 @@ impl Document {
         if !self.lights.is_empty() {
             document["extensions"] = json!({ "KHR_lights_punctual": { "lights": self.lights } });
         }
-        if let Some(image) = self.texture {
-            document["images"] = json!([image]);
-            document["samplers"] =
-                json!([{ "magFilter": NEAREST, "minFilter": NEAREST, "wrapS": REPEAT, "wrapT": REPEAT }]);
-            document["textures"] = json!([{ "sampler": 0, "source": 0 }]);
+        if !self.textures.is_empty() {
+            let samplers = [NEAREST, LINEAR]
+                .map(|filter| json!({ "magFilter": filter, "minFilter": filter, "wrapS": REPEAT, "wrapT": REPEAT }));
+            document["images"] = json!(self.images);
+            document["samplers"] = json!(samplers);
+            document["textures"] = json!(self.textures);
         }
         [
             File {

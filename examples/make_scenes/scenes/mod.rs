@@ -3,7 +3,10 @@
 mod document;
 mod mesh;
 
-use document::{Document, File, clear, emitting, glass, light, matte, metallic_roughness, mirror, one_sided};
+use document::{
+    Document, File, Filter, clear, emitting, glass, light, matte, metallic_roughness, mirror, one_sided, png,
+    with_texture,
+};
 use glam::{DVec3, dvec3};
 use mesh::Mesh;
 use serde_json::json;
@@ -21,6 +24,7 @@ pub fn all() -> Vec<File> {
         cornell_spheres(),
         glossy(),
         glasses(),
+        textures(),
         ring(),
         pool("pool", false),
         pool("pool-tiles", true),
@@ -123,7 +127,9 @@ fn pool(name: &'static str, tiles: bool) -> Document {
     const HEIGHT: f64 = 2.6;
     let mut scene = Document::new(name);
     let floor = if tiles {
-        scene.textured("tiles", &tile_png())
+        let texture = scene.texture(&tile_png(), Filter::Nearest);
+        let tiles = matte("tiles", [1.0; 3]);
+        scene.material(with_texture(tiles, "/pbrMetallicRoughness/baseColorTexture", texture))
     } else {
         scene.material(matte("floor", [0.7; 3]))
     };
@@ -163,18 +169,101 @@ fn waves(x: f64, z: f64) -> [f64; 3] {
 
 /// One tile with half its joint, 8 × 8 texels.
 fn tile_png() -> Vec<u8> {
-    let texel = |x, y| {
-        image::Rgb(if x == 0 || y == 0 {
-            [235, 240, 240]
+    png(8, 8, |x, y| {
+        if x == 0 || y == 0 {
+            [235, 240, 240, 255]
         } else {
-            [150, 190, 200]
-        })
+            [150, 190, 200, 255]
+        }
+    })
+}
+
+/// The same room with a checkered floor, a wall of studs, a fence, a pane of smoke, a ball of metal and plaster, and a lamp of
+/// two colours: every kind of texture.
+fn textures() -> Document {
+    let mut scene = cornell_room("textures");
+    let color = "/pbrMetallicRoughness/baseColorTexture";
+    let checker = scene.texture(
+        &png(2, 2, |x, y| {
+            if x == y {
+                [200, 60, 40, 255]
+            } else {
+                [230, 225, 210, 255]
+            }
+        }),
+        Filter::Nearest,
+    );
+    let studs = scene.texture(
+        &png(32, 32, |x, y| {
+            let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
+            let (x, y) = (at(x), -at(y));
+            let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+            let normal = if z > 0.5 { [x, y, z] } else { [0.0, 0.0, 1.0] };
+            let [r, g, b] = normal.map(|value| (127.5 + 127.5 * value).round() as u8);
+            [r, g, b, 255]
+        }),
+        Filter::Linear,
+    );
+    let fence = scene.texture(
+        &png(8, 8, |x, y| [120, 90, 50, if x % 4 == 0 || y == 4 { 255 } else { 0 }]),
+        Filter::Nearest,
+    );
+    let metal = scene.texture(
+        &png(8, 8, |x, y| {
+            [
+                0,
+                if y % 2 == 0 { 80 } else { 200 },
+                if x % 4 < 2 { 255 } else { 0 },
+                255,
+            ]
+        }),
+        Filter::Nearest,
+    );
+    let shine = scene.texture(
+        &png(2, 1, |x, _| {
+            if x == 0 {
+                [255, 120, 60, 255]
+            } else {
+                [60, 120, 255, 255]
+            }
+        }),
+        Filter::Linear,
+    );
+    let panel = |z: f64, low: f64, high: f64| {
+        Mesh::quad([[-0.5, low], [0.5, low], [0.5, high], [-0.5, high]].map(|[x, y]| dvec3(x, y, z)))
     };
-    let mut png = std::io::Cursor::new(Vec::new());
-    image::RgbImage::from_fn(8, 8, texel)
-        .write_to(&mut png, image::ImageFormat::Png)
-        .expect("memory takes any PNG");
-    png.into_inner()
+    let checkered = scene.material(with_texture(matte("checkered", [1.0; 3]), color, checker));
+    let mut tiles = Mesh::facing_up(0.9, 0.001);
+    tiles.texcoords.iter_mut().for_each(|place| *place *= 3.0);
+    scene.object("checkered", &tiles, checkered);
+    let studded = metallic_roughness("studded", [0.9, 0.8, 0.6], 0.0, 0.4);
+    let studded = scene.material(with_texture(studded, "/normalTexture", studs));
+    let mut wall = panel(-0.95, 0.4, 1.4);
+    wall.texcoords.iter_mut().for_each(|place| *place *= 4.0);
+    scene.object("studded", &wall, studded);
+    let mut fenced = with_texture(matte("fence", [1.0; 3]), color, fence);
+    fenced["alphaMode"] = "MASK".into();
+    let fenced = scene.material(fenced);
+    scene.object("fence", &panel(0.5, 0.002, 0.4), fenced);
+    let mut smoke = matte("smoke", [0.1; 3]);
+    smoke["alphaMode"] = "BLEND".into();
+    smoke["pbrMetallicRoughness"]["baseColorFactor"][3] = 0.4.into();
+    let smoke = scene.material(smoke);
+    scene.object("smoke", &panel(0.0, 0.6, 1.2), smoke).at([0.4, 0.0, 0.2]);
+    let mixed = metallic_roughness("mixed", [0.9, 0.7, 0.5], 1.0, 1.0);
+    let mixed = scene.material(with_texture(
+        mixed,
+        "/pbrMetallicRoughness/metallicRoughnessTexture",
+        metal,
+    ));
+    scene
+        .object("mixed", &panel(0.1, 0.002, 0.6), mixed)
+        .at([-0.4, 0.0, 0.0]);
+    let glow = with_texture(light("glow", [3.0; 3]), "/emissiveTexture", shine);
+    let glow = scene.material(glow);
+    scene.object("glow", &panel(0.0, 0.0, 0.2), glow).at([0.0, 0.05, -0.6]);
+    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
+    scene
 }
 
 /// A grey sphere in a box of radiance 1.

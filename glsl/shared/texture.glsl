@@ -1,0 +1,199 @@
+// What a surface's material is at a place: textures and the corners' colours. Include after scene.glsl.
+
+const uint TEXTURED_TRIANGLE = 4u; // of a triangle's flags, as the next
+const uint SEE_THROUGH = 8u;
+const uint NO_TEXTURE = 0xffffffffu;
+const uint MASK = 1u; // alpha modes; any other but 0 is a blend
+
+const uint SECOND_SET = 1u; // flags of a texture
+const uint SRGB = 2u;
+const uint NEAREST = 4u;
+const uint WRAP_U = 4u;
+const uint WRAP_V = 6u;
+const uint CLAMP = 1u;
+const uint MIRROR_REPEAT = 2u;
+
+struct Corner {
+    vec2 first;  // coordinates of the first set
+    vec2 second; // of the second set
+    uvec2 color; // f16s
+    uint tangent;
+    float bitangent;
+};
+
+struct TextureLookup {
+    vec3 row_u;
+    uint first_texel;
+    vec3 row_v;
+    uint size;
+    uint flags;
+    uint padding0;
+    uint padding1;
+    uint padding2;
+};
+
+uniform usamplerBuffer Corners;
+uniform usamplerBuffer Textures;
+uniform usamplerBuffer Texels;
+
+// What a place of a triangle has for textures.
+struct Place {
+    vec4 sets; // texture coordinates of both sets
+    vec4 color;
+    vec4 tangent; // w: the bitangent's side, 0 where there is none
+};
+
+Corner corner_at(uint i) {
+    vec4 sets = TEXEL(Corners, 2u * i);
+    uvec4 rest = TEXEL_BITS(Corners, 2u * i + 1u);
+    return Corner(sets.xy, sets.zw, rest.xy, rest.z, uintBitsToFloat(rest.w));
+}
+
+Place place_at(uint triangle, vec2 uv) {
+    Place place = Place(vec4(0.0), vec4(0.0), vec4(0.0));
+    for (uint i = 0u; i < 3u; i++) {
+        Corner corner = corner_at(3u * triangle + i);
+        float weight = i == 0u ? 1.0 - uv.x - uv.y : (i == 1u ? uv.x : uv.y);
+        place.sets += weight * vec4(corner.first, corner.second);
+        place.color += weight * vec4(unpackHalf2x16(corner.color.x), unpackHalf2x16(corner.color.y));
+        place.tangent += weight * vec4(decode_direction(corner.tangent) * abs(corner.bitangent), corner.bitangent);
+    }
+    return place;
+}
+
+TextureLookup lookup_at(uint i) {
+    uvec4 row_u = TEXEL_BITS(Textures, 3u * i);
+    uvec4 row_v = TEXEL_BITS(Textures, 3u * i + 1u);
+    uvec4 rest = TEXEL_BITS(Textures, 3u * i + 2u);
+    return TextureLookup(uintBitsToFloat(row_u.xyz), row_u.w, uintBitsToFloat(row_v.xyz), row_v.w, rest.x, 0u, 0u, 0u);
+}
+
+// The texel of an image of so many along one side that stands at a place.
+uint wrapped(float place, uint count, uint mode) {
+    float n = float(count);
+    mode &= 3u;
+    if (mode == CLAMP) {
+        return uint(clamp(place, 0.0, n - 1.0));
+    }
+    // Whole numbers: exact up to 2^24.
+    float period = mode == MIRROR_REPEAT ? 2.0 * n : n;
+    float rest = clamp(place - period * floor(place / period), 0.0, period - 1.0);
+    return uint(min(rest, mode == MIRROR_REPEAT ? period - 1.0 - rest : rest));
+}
+
+vec4 texel_at(TextureLookup lookup, float x, float y) {
+    uint width = lookup.size & 0xffffu;
+    uint column = wrapped(x, width, lookup.flags >> WRAP_U);
+    uint row = wrapped(y, lookup.size >> 16u, lookup.flags >> WRAP_V);
+    uint index = lookup.first_texel + row * width + column;
+    uvec4 four = TEXEL_BITS(Texels, index >> 2u);
+    vec4 texel = unpackUnorm4x8(four[index & 3u]);
+    if ((lookup.flags & SRGB) != 0u) {
+        // IEC 61966-2-1.
+        vec3 dark = texel.rgb / 12.92;
+        vec3 bright = pow((texel.rgb + 0.055) / 1.055, vec3(2.4));
+        texel.rgb = mix(bright, dark, lessThanEqual(texel.rgb, vec3(0.04045)));
+    }
+    return texel;
+}
+
+// The value of a texture, RGBA, linear. There are no mip levels: a pixel is the mean of many places.
+vec4 texture_value(uint index, Place place) {
+    TextureLookup lookup = lookup_at(index);
+    vec3 set = vec3((lookup.flags & SECOND_SET) != 0u ? place.sets.zw : place.sets.xy, 1.0);
+    vec2 at = vec2(dot(lookup.row_u, set), dot(lookup.row_v, set)) * vec2(lookup.size & 0xffffu, lookup.size >> 16u);
+    bool nearest = (lookup.flags & NEAREST) != 0u;
+    at -= nearest ? vec2(0.0) : vec2(0.5);
+    vec2 low = floor(at);
+    vec2 part = nearest ? vec2(0.0) : at - low;
+    vec4 value = vec4(0.0);
+    for (uint i = 0u; i < (nearest ? 1u : 4u); i++) {
+        vec2 corner = vec2(i & 1u, i >> 1u);
+        vec2 weight = mix(1.0 - part, part, corner);
+        value += weight.x * weight.y * texel_at(lookup, low.x + corner.x, low.y + corner.y);
+    }
+    return value;
+}
+
+// The normal that a texture leans to, on the side of the geometric one.
+vec3 leaning_normal(Surface surface, Place place, vec3 value, float scale) {
+    vec3 n = surface.shading_normal;
+    vec3 t = place.tangent.xyz - dot(place.tangent.xyz, n) * n;
+    float length2 = dot(t, t);
+    if (length2 < 1e-12 || place.tangent.w == 0.0) {
+        return n;
+    }
+    t *= inversesqrt(length2);
+    vec3 b = sign(place.tangent.w) * cross(n, t);
+    vec3 local = value * 2.0 - 1.0;
+    vec3 leaning = local.x * scale * t + local.y * scale * b + local.z * n;
+    float leaning2 = dot(leaning, leaning);
+    bool fits = leaning2 > 1e-12 && dot(leaning, surface.geometric_normal) > 0.0;
+    return fits ? leaning * inversesqrt(leaning2) : n;
+}
+
+// A surface's material at its place. A texture of normals turns its shading normal.
+Material material_of(inout Surface surface) {
+    Material material = material_at(surface.material);
+    bool textured = TEXTURED && (surface.flags & TEXTURED_TRIANGLE) != 0u;
+    if (!textured) {
+        return material;
+    }
+    Place place = place_at(surface.triangle, surface.uv);
+    uvec4 first = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 5u);
+    uvec4 second = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 6u);
+    material.base_color *= place.color.rgb;
+    // One loop, so that the code that looks a texture up is there once.
+    for (uint i = 0u; i < 7u; i++) {
+        uint index = i < 4u ? first[i] : second[i - 4u];
+        if (index == NO_TEXTURE) {
+            continue;
+        }
+        vec4 value = texture_value(index, place);
+        if (i == 0u) {
+            material.base_color *= value.rgb;
+        } else if (i == 1u) {
+            material.roughness *= value.g;
+            material.metallic *= value.b;
+        } else if (i == 2u) {
+            surface.shading_normal = leaning_normal(surface, place, value.rgb, uintBitsToFloat(second.w));
+        } else if (i == 3u) {
+            material.emission *= value.rgb;
+        } else if (i == 4u) {
+            material.transmission *= value.r;
+        } else if (i == 5u) {
+            material.specular_f0 *= value.a;
+            material.specular_f90 *= value.a;
+        } else {
+            material.specular_f0 *= value.rgb;
+        }
+    }
+    material.base_color = min(material.base_color, 1.0);
+    return material;
+}
+
+// The part of a place's surface that is there.
+float alpha_at(uint triangle, uint material, uint flags, vec2 uv) {
+    uvec4 mode = TEXEL_BITS(Materials, MATERIAL_TEXELS * material + 7u);
+    float alpha = uintBitsToFloat(mode.z);
+    bool textured = TEXTURED && (flags & TEXTURED_TRIANGLE) != 0u;
+    if (textured) {
+        Place place = place_at(triangle, uv);
+        uint color = TEXEL_BITS(Materials, MATERIAL_TEXELS * material + 5u).x;
+        alpha *= place.color.a;
+        if (color != NO_TEXTURE) {
+            alpha *= texture_value(color, place).a;
+        }
+    }
+    return mode.x == MASK ? (alpha < uintBitsToFloat(mode.y) ? 0.0 : 1.0) : clamp(alpha, 0.0, 1.0);
+}
+
+// Of a surface's point that was chosen without regard for what is there.
+float share_there(Surface surface) {
+    bool see_through = ALPHA && (surface.flags & SEE_THROUGH) != 0u;
+    float share = 1.0;
+    if (see_through) {
+        share = alpha_at(surface.triangle, surface.material, surface.flags, surface.uv);
+    }
+    return share;
+}

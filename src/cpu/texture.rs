@@ -1,0 +1,156 @@
+//! What a surface's material is at a place: `glsl/shared/texture.glsl`, and `glsl/shared/alpha.glsl`.
+
+use glam::{DVec2, DVec3, DVec4};
+use half::f16;
+
+use super::Inputs;
+use super::intersect::{Hit, Ray, nearest_hit};
+use super::random::Random;
+use super::sampling::decode_direction;
+use super::surface::Surface;
+use super::vector::rgb;
+use crate::layout::{BLEND, MASK, Material, NO_TEXTURE, SEE_THROUGH, TEXTURED};
+use crate::scene::PackedScene;
+
+/// What a place of a triangle has for textures.
+struct Place {
+    sets: [DVec2; 2],
+    color: DVec4,
+    /// w: the bitangent's side, 0 where there is none.
+    tangent: DVec4,
+}
+
+impl Place {
+    fn of(scene: &PackedScene, triangle: u32, [u, v]: [f64; 2]) -> Self {
+        let mut place = Self {
+            sets: [DVec2::ZERO; 2],
+            color: DVec4::ZERO,
+            tangent: DVec4::ZERO,
+        };
+        let corners = &scene.corners[3 * triangle as usize..][..3];
+        for (corner, weight) in corners.iter().zip([1.0 - u - v, u, v]) {
+            let half = |word: u32| f64::from(f16::from_bits(word as u16));
+            let [low, high] = corner.color;
+            let color = [half(low), half(low >> 16), half(high), half(high >> 16)];
+            place.sets[0] += weight * DVec2::from(corner.first.map(f64::from));
+            place.sets[1] += weight * DVec2::from(corner.second.map(f64::from));
+            place.color += weight * DVec4::from(color);
+            let side = f64::from(corner.bitangent);
+            place.tangent += weight * (decode_direction(corner.tangent) * side.abs()).extend(side);
+        }
+        place
+    }
+}
+
+/// The value of a texture, or `None` where there is none.
+fn value(scene: &PackedScene, texture: u32, place: &Place) -> Option<DVec4> {
+    let lookup = (texture != NO_TEXTURE).then(|| &scene.textures[texture as usize])?;
+    Some(lookup.value(scene.texels.as_flattened(), place.sets))
+}
+
+/// Gives a surface the material of its place. A texture of normals turns its shading normal.
+pub(super) fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
+    if surface.flags & TEXTURED == 0 {
+        return;
+    }
+    let place = Place::of(scene, surface.triangle, surface.uv);
+    let at = |texture: u32| value(scene, texture, &place);
+    let times = |color: [f32; 3], factor: DVec3| (rgb(color) * factor).as_vec3().to_array();
+    let textures = surface.material;
+    let material = &mut surface.material;
+    let color = at(textures.color_texture).unwrap_or(DVec4::ONE) * place.color;
+    material.base_color = times(material.base_color, color.truncate()).map(|value| value.min(1.0));
+    if let Some(value) = at(textures.metal_texture) {
+        material.roughness *= value.y as f32;
+        material.metallic *= value.z as f32;
+    }
+    if let Some(value) = at(textures.emission_texture) {
+        material.emission = times(material.emission, value.truncate());
+    }
+    if let Some(value) = at(textures.transmission_texture) {
+        material.transmission *= value.x as f32;
+    }
+    if let Some(value) = at(textures.specular_texture) {
+        material.specular_f0 = times(material.specular_f0, DVec3::splat(value.w));
+        material.specular_f90 *= value.w as f32;
+    }
+    if let Some(value) = at(textures.specular_color_texture) {
+        material.specular_f0 = times(material.specular_f0, value.truncate());
+    }
+    if let Some(value) = at(textures.normal_texture) {
+        surface.shading_normal = leaning_normal(surface, &place, value.truncate(), textures.normal_scale.into());
+    }
+}
+
+/// The normal that a texture leans to, on the side of the geometric one.
+fn leaning_normal(surface: &Surface, place: &Place, value: DVec3, scale: f64) -> DVec3 {
+    let n = surface.shading_normal;
+    let t = place.tangent.truncate();
+    let t = t - t.dot(n) * n;
+    if t.length_squared() < 1e-12 || place.tangent.w == 0.0 {
+        return n;
+    }
+    let t = t.normalize();
+    let b = place.tangent.w.signum() * n.cross(t);
+    let local = 2.0 * value - 1.0;
+    let leaning = local.x * scale * t + local.y * scale * b + local.z * n;
+    if leaning.length_squared() > 1e-12 && leaning.dot(surface.geometric_normal) > 0.0 {
+        leaning.normalize()
+    } else {
+        n
+    }
+}
+
+/// The part of a place's surface that is there.
+fn alpha_at(scene: &PackedScene, triangle: u32, uv: [f64; 2]) -> f64 {
+    let shading = &scene.shading_triangles[triangle as usize];
+    let material: &Material = &scene.materials[shading.material as usize];
+    let mut alpha = f64::from(material.alpha);
+    if shading.flags & TEXTURED != 0 {
+        let place = Place::of(scene, triangle, uv);
+        alpha *= place.color.w * value(scene, material.color_texture, &place).map_or(1.0, |value| value.w);
+    }
+    match material.alpha_mode {
+        MASK if alpha < f64::from(material.alpha_cutoff) => 0.0,
+        BLEND => alpha.clamp(0.0, 1.0),
+        _ => 1.0,
+    }
+}
+
+/// Of a surface's point that was chosen without regard for what is there.
+pub(super) fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
+    if surface.flags & SEE_THROUGH == 0 {
+        return 1.0;
+    }
+    alpha_at(scene, surface.triangle, surface.uv)
+}
+
+/// As [`nearest_hit`], by chance through what is there in part: a pure function of the ray's place in its path.
+pub(super) fn nearest_visible(
+    inputs: &Inputs<'_>,
+    ray: Ray,
+    t_max: f64,
+    ignored: Option<u32>,
+    random: &Random,
+) -> Option<Hit> {
+    let mut hit = nearest_hit(inputs, ray, t_max, ignored)?;
+    if !inputs.scene.features.alpha {
+        return Some(hit);
+    }
+    let (mut passed, mut number) = (0.0, 0);
+    loop {
+        let flags = inputs.scene.shading_triangles[hit.triangle as usize].flags;
+        if flags & SEE_THROUGH == 0 || random.of_passage(number) < alpha_at(inputs.scene, hit.triangle, [hit.u, hit.v])
+        {
+            hit.t += passed;
+            return Some(hit);
+        }
+        passed += hit.t;
+        number += 1;
+        let behind = Ray {
+            origin: ray.origin + passed * ray.direction,
+            ..ray
+        };
+        hit = nearest_hit(inputs, behind, t_max - passed, Some(hit.triangle))?;
+    }
+}

@@ -1,0 +1,316 @@
+//! Textures: which places of which images a material looks its values up at.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{DVec2, DVec4, dvec4};
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::texture::{MagFilter, WrappingMode};
+use gltf::json::validation::Checked;
+
+use super::diagnostic::{Check, damaged, label, list};
+use super::document::Document;
+use super::image::Pixels;
+use crate::layout::{CLAMP, MIRROR_REPEAT, NEAREST, REPEAT, SECOND_SET, SRGB, TextureLookup, WRAP_U, WRAP_V};
+
+/// Source of a texture that names no image.
+const NO_SOURCE: usize = u32::MAX as usize;
+
+/// All textures of a scene, in the layout of the device.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Textures {
+    /// How each is looked up.
+    pub lookups: Vec<TextureLookup>,
+    /// Texels of all images, RGBA bytes.
+    pub texels: Vec<u32>,
+}
+
+/// What a material says of one of its textures, whatever it is for.
+#[derive(Debug, Clone)]
+pub(super) struct TextureUse {
+    /// Index of the texture.
+    pub texture: usize,
+    /// Set of coordinates.
+    pub set: u32,
+    pub transform: Option<TextureTransform>,
+    /// Whether its colours are sRGB.
+    pub srgb: bool,
+}
+
+/// Collects the textures that materials use.
+pub(super) struct TextureReader<'a> {
+    document: &'a Document,
+    folder: &'a Path,
+    textures: Textures,
+    /// First texel and size of each image that has been read; `None` of one that can't be.
+    images: HashMap<usize, Option<[u32; 2]>>,
+}
+
+impl<'a> TextureReader<'a> {
+    /// Reads textures of a file in `folder`.
+    pub(super) fn new(document: &'a Document, folder: &'a Path) -> Self {
+        Self {
+            document,
+            folder,
+            textures: Textures::default(),
+            images: HashMap::new(),
+        }
+    }
+
+    /// All that have been read.
+    pub(super) fn finish(self) -> Textures {
+        self.textures
+    }
+
+    /// Index of a lookup; `None`, with a warning, for an image that can't be read.
+    pub(super) fn lookup(&mut self, wanted: &TextureUse, warnings: &mut Vec<String>) -> Check<Option<u32>> {
+        let root = &self.document.root;
+        let textures = &root.textures;
+        let texture = textures.get(wanted.texture).ok_or_else(|| {
+            damaged(format_args!(
+                "there is no texture {}, the file has {}",
+                wanted.texture,
+                textures.len()
+            ))
+        })?;
+        let index = texture.source.value();
+        if index == NO_SOURCE {
+            let extensions = texture
+                .extensions
+                .as_ref()
+                .map(|extensions| extensions.others.keys().cloned().collect());
+            let extensions: Vec<String> = extensions.unwrap_or_default();
+            warnings.push(format!(
+                "texture {} has no image but by {}, which isn't supported; it is left out",
+                wanted.texture,
+                if extensions.is_empty() {
+                    "nothing".to_owned()
+                } else {
+                    list(&extensions)
+                }
+            ));
+            return Ok(None);
+        }
+        let image = root.images.get(index).ok_or_else(|| {
+            damaged(format_args!(
+                "there is no image {index}, the file has {}",
+                root.images.len()
+            ))
+        })?;
+        let place = match self.images.get(&index) {
+            Some(place) => *place,
+            None => {
+                let label = label("image", index, image.name.as_deref());
+                let place = match Pixels::read(self.document, image, self.folder) {
+                    Ok(pixels) => Some(self.add(&pixels)?),
+                    Err(what) => {
+                        warnings.push(format!("{label}: {what}; its textures are left out"));
+                        None
+                    }
+                };
+                self.images.insert(index, place);
+                place
+            }
+        };
+        let Some([first_texel, size]) = place else {
+            return Ok(None);
+        };
+        let sampler = texture.sampler.map(|sampler| {
+            root.samplers.get(sampler.value()).ok_or_else(|| {
+                damaged(format_args!(
+                    "there is no sampler {sampler}, the file has {}",
+                    root.samplers.len()
+                ))
+            })
+        });
+        let sampler = sampler.transpose()?;
+        let wrap = |mode: Option<&Checked<WrappingMode>>| match mode {
+            Some(Checked::Valid(WrappingMode::ClampToEdge)) => CLAMP,
+            Some(Checked::Valid(WrappingMode::MirroredRepeat)) => MIRROR_REPEAT,
+            _ => REPEAT,
+        };
+        let nearest = sampler.is_some_and(|sampler| sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest)));
+        let transform = wanted.transform.as_ref();
+        let set = transform
+            .and_then(|transform| transform.tex_coord)
+            .unwrap_or(wanted.set);
+        if set > 1 {
+            warnings.push(format!(
+                "its TEXCOORD_{set} isn't read, only sets 0 and 1 are; set 0 is used"
+            ));
+        }
+        let [row_u, row_v] = rows(transform)?;
+        let lookup = TextureLookup {
+            row_u,
+            first_texel,
+            row_v,
+            size,
+            flags: if set == 1 { SECOND_SET } else { 0 }
+                | if wanted.srgb { SRGB } else { 0 }
+                | if nearest { NEAREST } else { 0 }
+                | wrap(sampler.map(|sampler| &sampler.wrap_s)) << WRAP_U
+                | wrap(sampler.map(|sampler| &sampler.wrap_t)) << WRAP_V,
+            padding0: 0,
+            padding1: 0,
+            padding2: 0,
+        };
+        let lookups = &mut self.textures.lookups;
+        let known = lookups.iter().position(|known| *known == lookup);
+        Ok(Some(known.unwrap_or_else(|| {
+            lookups.push(lookup);
+            lookups.len() - 1
+        }) as u32))
+    }
+}
+
+impl TextureReader<'_> {
+    /// Adds an image; returns its first texel and its size.
+    fn add(&mut self, pixels: &Pixels) -> Check<[u32; 2]> {
+        let texels = &mut self.textures.texels;
+        let first = u32::try_from(texels.len()).ok();
+        let first = first
+            .filter(|first| first.checked_add(pixels.rgba.len() as u32).is_some())
+            .ok_or("its images have more than 4,294,967,295 texels; make them smaller")?;
+        texels.extend(pixels.rgba.iter().map(|rgba| u32::from_le_bytes(*rgba)));
+        Ok([first, pixels.width | pixels.height << 16])
+    }
+}
+
+/// KHR_texture_transform: offset · rotation · scale.
+fn rows(transform: Option<&TextureTransform>) -> Check<[[f32; 3]; 2]> {
+    let Some(transform) = transform else {
+        return Ok([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    };
+    let ([x, y], [w, h]) = (transform.offset.0, transform.scale.0);
+    let (sin, cos) = f64::from(transform.rotation.0).sin_cos();
+    let (sin, cos) = (sin as f32, cos as f32);
+    let rows = [[cos * w, sin * h, x], [-sin * w, cos * h, y]];
+    if rows.as_flattened().iter().all(|value| value.is_finite()) {
+        Ok(rows)
+    } else {
+        Err(damaged("its KHR_texture_transform isn't finite"))
+    }
+}
+
+impl Textures {
+    /// The value of a texture, RGBA, linear; `sets` are the coordinates of both sets.
+    pub fn value(&self, index: u32, sets: [DVec2; 2]) -> DVec4 {
+        self.lookups[index as usize].value(&self.texels, sets)
+    }
+}
+
+impl TextureLookup {
+    /// The value of the texture, RGBA, linear; `sets` are the coordinates of both sets. There are no mip levels: a pixel is
+    /// the mean of many places.
+    pub fn value(&self, texels: &[u32], sets: [DVec2; 2]) -> DVec4 {
+        let set = sets[usize::from(self.flags & SECOND_SET != 0)];
+        let place = |row: [f32; 3]| f64::from(row[0]) * set.x + f64::from(row[1]) * set.y + f64::from(row[2]);
+        let size = [self.size & 0xffff, self.size >> 16];
+        let [u, v] = [
+            place(self.row_u) * f64::from(size[0]),
+            place(self.row_v) * f64::from(size[1]),
+        ];
+        let texel = |x: i64, y: i64| {
+            let (x, y) = (
+                wrap(x, size[0], self.flags >> WRAP_U),
+                wrap(y, size[1], self.flags >> WRAP_V),
+            );
+            decode(
+                texels[(self.first_texel + y * size[0] + x) as usize],
+                self.flags & SRGB != 0,
+            )
+        };
+        if self.flags & NEAREST != 0 {
+            return texel(u.floor() as i64, v.floor() as i64);
+        }
+        let (u, v) = (u - 0.5, v - 0.5);
+        let (x, y) = (u.floor(), v.floor());
+        let row = |y| texel(x as i64, y).lerp(texel(x as i64 + 1, y), u - x);
+        row(y as i64).lerp(row(y as i64 + 1), v - y)
+    }
+}
+
+/// The texel of an image of so many along one side that stands at a place.
+fn wrap(place: i64, count: u32, mode: u32) -> u32 {
+    let count = i64::from(count);
+    (match mode & 3 {
+        CLAMP => place.clamp(0, count - 1),
+        MIRROR_REPEAT => {
+            let place = place.rem_euclid(2 * count);
+            place.min(2 * count - 1 - place)
+        }
+        _ => place.rem_euclid(count),
+    }) as u32
+}
+
+fn decode(texel: u32, srgb: bool) -> DVec4 {
+    let [r, g, b, a] = texel.to_le_bytes().map(|byte| f64::from(byte) / 255.0);
+    // IEC 61966-2-1.
+    let linear = |value: f64| match value {
+        _ if !srgb => value,
+        dark if dark <= 0.040_45 => dark / 12.92,
+        bright => ((bright + 0.055) / 1.055).powf(2.4),
+    };
+    dvec4(linear(r), linear(g), linear(b), a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two by two texels: black, red; green, white.
+    fn checker(flags: u32) -> Textures {
+        Textures {
+            lookups: vec![TextureLookup {
+                row_u: [1.0, 0.0, 0.0],
+                first_texel: 0,
+                row_v: [0.0, 1.0, 0.0],
+                size: 2 | 2 << 16,
+                flags,
+                padding0: 0,
+                padding1: 0,
+                padding2: 0,
+            }],
+            texels: vec![0xff00_0000, 0xff00_00ff, 0xff00_ff00, 0xffff_ffff],
+        }
+    }
+
+    fn at(textures: &Textures, u: f64, v: f64) -> [f64; 4] {
+        textures.value(0, [DVec2::new(u, v), DVec2::ZERO]).to_array()
+    }
+
+    #[test]
+    fn the_nearest_texel_is_taken_or_four_are_blended() {
+        let nearest = checker(NEAREST);
+        assert_eq!(at(&nearest, 0.1, 0.1), [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(at(&nearest, 0.9, 0.1), [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(at(&nearest, 0.1, 0.9), [0.0, 1.0, 0.0, 1.0]);
+        let blended = checker(0);
+        assert_eq!(at(&blended, 0.25, 0.25), [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(at(&blended, 0.5, 0.5), [0.5, 0.5, 0.25, 1.0]);
+    }
+
+    #[test]
+    fn places_outside_wrap_as_the_sampler_says() {
+        let with = |mode| checker(NEAREST | mode << WRAP_U | mode << WRAP_V);
+        let red = [1.0, 0.0, 0.0, 1.0];
+        // 1.25 is in the first texel again, in the last still, in the last once more.
+        assert_eq!(at(&with(REPEAT), 1.25, 0.0), [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(at(&with(CLAMP), 1.25, 0.0), red);
+        assert_eq!(at(&with(MIRROR_REPEAT), 1.25, 0.0), red);
+        assert_eq!(at(&with(REPEAT), -0.25, 0.0), red);
+        assert_eq!(at(&with(CLAMP), -7.0, 0.0), [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(at(&with(MIRROR_REPEAT), -0.75, 0.0), red);
+    }
+
+    #[test]
+    fn srgb_is_decoded_before_texels_are_blended() {
+        let blended = at(&checker(SRGB), 0.5, 0.25);
+        assert_eq!(blended[0], 0.5);
+        let mut grey = checker(SRGB | NEAREST);
+        grey.texels[0] = 0x80bc_bcbc;
+        let [value, .., alpha] = at(&grey, 0.0, 0.0);
+        assert!((value - 0.502_886).abs() < 1e-5, "{value}");
+        assert!((alpha - 128.0 / 255.0).abs() < 1e-12, "{alpha}");
+    }
+}

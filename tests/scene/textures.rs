@@ -1,0 +1,145 @@
+//! Textures, vertex colours and alpha.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use glam::DVec2;
+use ppm_vk::layout::{CLAMP, MIRROR_REPEAT, NEAREST, SECOND_SET, SRGB, WRAP_U, WRAP_V};
+use ppm_vk::scene::Alpha;
+use serde_json::{Value, json};
+
+use super::fixture::Fixture;
+
+/// A PNG of two texels side by side, as a data URI.
+fn two_texels() -> String {
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbaImage::from_vec(2, 1, vec![255, 0, 0, 255, 0, 255, 0, 128])
+        .expect("two texels")
+        .write_to(&mut png, image::ImageFormat::Png)
+        .expect("a PNG");
+    format!("data:image/png;base64,{}", STANDARD.encode(png.into_inner()))
+}
+
+/// The room with a floor of this material and one texture, of two texels.
+fn textured(material: Value) -> Fixture {
+    let mut room = Fixture::room();
+    room.set("/materials/0", material);
+    room.set("/textures", json!([{"source": 0}]));
+    room.set("/images", json!([{"uri": two_texels()}]));
+    room
+}
+
+fn with_base_color(info: Value) -> Value {
+    json!({"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": info}})
+}
+
+#[test]
+fn one_image_is_stored_once_and_looked_up_as_each_slot_wants() {
+    let texture = json!({"index": 0});
+    let scene = textured(json!({
+        "pbrMetallicRoughness": {"baseColorTexture": texture, "metallicRoughnessTexture": texture},
+        "normalTexture": {"index": 0, "scale": 0.5},
+        "emissiveTexture": texture, "emissiveFactor": [1, 1, 1],
+        "extensions": {
+            "KHR_materials_transmission": {"transmissionFactor": 1, "transmissionTexture": texture},
+            "KHR_materials_volume": {"thicknessFactor": 1},
+            "KHR_materials_specular": {"specularTexture": texture, "specularColorTexture": texture}
+        }
+    }))
+    .scene();
+    let textures = &scene.materials[0].textures;
+    let [color, linear] = [Some(0), Some(1)];
+    assert_eq!(
+        (textures.base_color, textures.emission, textures.specular_color),
+        (color, color, color)
+    );
+    assert_eq!(
+        (textures.metallic_roughness, textures.transmission, textures.specular),
+        (linear, linear, linear)
+    );
+    assert_eq!(textures.normal, Some((1, 0.5)));
+    assert_eq!((scene.textures.lookups.len(), scene.textures.texels.len()), (2, 2));
+    assert_eq!(scene.textures.lookups[0].flags, SRGB);
+}
+
+#[test]
+fn samplers_sets_and_transforms_are_what_the_file_says() {
+    let transform =
+        json!({"offset": [0.5, 0.25], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2, 3], "texCoord": 1});
+    let info = json!({"index": 0, "extensions": {"KHR_texture_transform": transform}});
+    let mut room = textured(with_base_color(info));
+    room.set("/textures/0/sampler", json!(0));
+    room.set(
+        "/samplers",
+        json!([{"magFilter": 9728, "wrapS": 33071, "wrapT": 33648}]),
+    );
+    let scene = room.scene();
+    let lookup = &scene.textures.lookups[0];
+    assert_eq!(
+        lookup.flags,
+        SRGB | NEAREST | SECOND_SET | CLAMP << WRAP_U | MIRROR_REPEAT << WRAP_V
+    );
+    // Scaled, turned by a quarter, moved: (u, v) → (3 v + 1/2, −2 u + 1/4).
+    let close = |row: [f32; 3], expected: [f32; 3]| row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6);
+    assert!(
+        close(lookup.row_u, [0.0, 3.0, 0.5]) && close(lookup.row_v, [-2.0, 0.0, 0.25]),
+        "{lookup:?}"
+    );
+    // The second set alone is read: 3 · 0.2 + 0.5 lies past the last texel, which goes on.
+    let value = scene.textures.value(0, [DVec2::splat(7.0), DVec2::new(0.0, 0.2)]);
+    assert_eq!(value.to_array(), [0.0, 1.0, 0.0, 128.0 / 255.0]);
+}
+
+#[test]
+fn images_that_cannot_be_read_are_told_and_left_out() {
+    let floor = || with_base_color(json!({"index": 0}));
+    for (image, parts) in [
+        (json!({"uri": "absent.png"}), ["absent.png", "left out"]),
+        (
+            json!({"uri": "data:image/webp;base64,UklGRhAAAABXRUJQVlA4TAAAAAA="}),
+            ["PNG", "left out"],
+        ),
+        (
+            json!({"uri": "data:;base64,AAAA"}),
+            ["neither PNG nor JPEG", "left out"],
+        ),
+        (json!({}), ["neither a uri nor a bufferView", "left out"]),
+    ] {
+        let mut room = textured(floor());
+        room.set("/images/0", image);
+        let scene = room.assert_warns(&[&["material 0", "image 0"], &parts[..]].concat());
+        assert_eq!(scene.materials[0].textures.base_color, None);
+    }
+    let mut room = textured(floor());
+    room.set(
+        "/textures/0",
+        json!({"extensions": {"KHR_texture_basisu": {"source": 0}}}),
+    );
+    room.assert_warns(&["texture 0", "KHR_texture_basisu", "left out"]);
+}
+
+#[test]
+fn textures_that_do_not_exist_are_refused() {
+    let room = textured(with_base_color(json!({"index": 3})));
+    room.assert_fails(&["material 0", "no texture 3"]);
+    let mut room = textured(with_base_color(json!({"index": 0})));
+    room.set("/textures/0/source", json!(5));
+    room.assert_fails(&["material 0", "no image 5"]);
+    room.set("/textures/0", json!({"source": 0, "sampler": 9}));
+    room.assert_fails(&["material 0", "no sampler 9"]);
+}
+
+#[test]
+fn alpha_is_as_the_file_says() {
+    let with = |more: Value| {
+        let mut material = json!({"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": [1, 1, 1, 0.25]}});
+        for (key, value) in more.as_object().expect("an object") {
+            material[key] = value.clone();
+        }
+        textured(material).scene().materials[0].alpha
+    };
+    assert_eq!(with(json!({})), Alpha::Opaque);
+    assert_eq!(with(json!({"alphaMode": "BLEND"})), Alpha::Blend { alpha: 0.25 });
+    let mask = |cutoff| Alpha::Mask { alpha: 0.25, cutoff };
+    assert_eq!(with(json!({"alphaMode": "MASK"})), mask(0.5));
+    assert_eq!(with(json!({"alphaMode": "MASK", "alphaCutoff": 0.2})), mask(0.2));
+}
