@@ -1,0 +1,40 @@
+//! Puts PNGs of one size beside each other on a sheet: `cargo run --example contact_sheet -- SHEET.png PICTURE.png ...`
+
+use anyhow::{Context, Result, ensure};
+use image::{GenericImage, RgbImage};
+
+/// Pixels between pictures.
+const GAP: u32 = 4;
+
+fn main() -> Result<()> {
+    let mut arguments = std::env::args_os().skip(1);
+    let sheet = arguments.next().context("name the sheet to write, then its pictures")?;
+    let mut pictures = Vec::new();
+    for name in arguments {
+        let name = std::path::PathBuf::from(name);
+        pictures.push(
+            image::open(&name)
+                .with_context(|| name.display().to_string())?
+                .into_rgb8(),
+        );
+    }
+    let first = pictures.first().context("name the pictures after the sheet")?;
+    let (width, height) = first.dimensions();
+    ensure!(
+        pictures.iter().all(|picture| picture.dimensions() == (width, height)),
+        "the pictures have different sizes"
+    );
+    let columns = (pictures.len() as f64).sqrt().ceil() as u32;
+    let rows = (pictures.len() as u32).div_ceil(columns);
+    let mut whole = RgbImage::from_pixel(
+        columns * (width + GAP) - GAP,
+        rows * (height + GAP) - GAP,
+        image::Rgb([255; 3]),
+    );
+    for (index, picture) in (0..).zip(&pictures) {
+        let (column, row) = (index % columns, index / columns);
+        whole.copy_from(picture, column * (width + GAP), row * (height + GAP))?;
+    }
+    whole.save(&sheet)?;
+    Ok(())
+}
