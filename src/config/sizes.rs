@@ -1,0 +1,306 @@
+//! Every buffer size and group count, and the numbers that they follow from.
+
+use super::{Estimator, RenderConfig};
+use crate::layout::{
+    Coverage, DirectSum, Gathered, Gloss, GridShape, Photon, RadiusSum, Statistics, StatusCounters, VisiblePoint,
+};
+use crate::stage::BufferId;
+
+/// Pixels of a tile's side: visible points lie in memory tile by tile.
+pub const TILE: u32 = 8;
+/// Visible points of a pixel at the most, where they are found once: glass splits the path while a slot is free.
+pub const PPM_SLOTS: u32 = 8;
+/// Photons that one launch of a gather that tests every photon looks at, below every known driver's loop limit.
+pub const EXHAUSTIVE_RANGE: u32 = 16_000;
+/// Visible points of a workgroup of the paper's orders: the workgroup size of `gather_*.comp`, `RUN` of `clusters.glsl`.
+pub const GROUP: u32 = 64;
+/// What an order of visible points has at a filler's place.
+pub const NO_SLOT: u32 = u32::MAX;
+/// Bits of a key along the space-filling curve of `point_curve.comp`.
+pub const CURVE_BITS: u32 = 18;
+/// Rounds of Lloyd's algorithm for the k-means clusters.
+pub const LLOYD_ROUNDS: u32 = 4;
+/// Visible points that an invocation of `gather_clustered.comp` has.
+pub const CLUSTERED_RUN: u32 = 8;
+/// Workgroups that sum up the radii.
+pub const RADIUS_GROUPS: u32 = 256;
+/// The radius of every how many slots they look at: odd, so that it meets each of a pixel's slots.
+pub const RADIUS_STEP: u32 = 7;
+/// Numbers of a block of the prefix sum.
+pub const SCAN_BLOCK: u32 = 2048;
+/// Keys of a tile of the radix sort.
+pub const SORT_TILE: u32 = 2048;
+/// Bits of a digit of the radix sort.
+pub const SORT_DIGIT_BITS: u32 = 5;
+
+/// Sizes of a render's buffers, in elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Pixels, width and height.
+    pub resolution: [u32; 2],
+    /// Slots for pixels: whole tiles.
+    pub pixel_slots: u32,
+    /// Visible points a pixel.
+    pub slots_per_pixel: u32,
+    /// Photon paths of a batch.
+    pub batch_paths: u32,
+    /// Invocations of the photon stage.
+    pub photon_lanes: u32,
+    /// Photons that one of them can store.
+    pub lane_capacity: u32,
+    /// Photons that a batch can store.
+    pub photon_capacity: u32,
+    /// log2 of the grid's buckets.
+    pub cell_bits: u32,
+    /// Launches among which a gather's photons are dealt: 1 unless the driver cuts its loops.
+    pub gather_parts: u32,
+    /// The scene's objects.
+    pub meshes: u32,
+    /// Cells of all objects' grids.
+    pub object_cells: u32,
+    /// Whether the scene has glossy surfaces.
+    pub glossy: bool,
+    /// Photons of such a cell at the most.
+    pub cell_photons: Option<u32>,
+    /// What a bench asks of the gathers.
+    pub probe: Probe,
+}
+
+/// What a bench asks of the gathers besides gathering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Probe {
+    /// Gathers that test every photon do so for every stride-th workgroup of visible points.
+    pub stride: u32,
+    /// Whether the photons tested are counted.
+    pub count_tests: bool,
+}
+
+impl Default for Probe {
+    fn default() -> Self {
+        Self {
+            stride: 1,
+            count_tests: false,
+        }
+    }
+}
+
+/// What of a device and a scene the sizes depend on.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Bytes that one storage buffer binding can span.
+    pub storage_buffer_bytes: u64,
+    /// Loop iterations that an invocation is given.
+    pub loop_limit: u32,
+    /// Invocations that keep the device busy.
+    pub lanes: u32,
+    /// Whether the scene has surfaces at which a path splits in two.
+    pub splitting: bool,
+    /// Whether it has glossy surfaces.
+    pub glossy: bool,
+    /// The scene's objects.
+    pub meshes: u32,
+    /// Cells of all objects' grids.
+    pub object_cells: u32,
+}
+
+/// A quarter more, and some.
+fn with_room(need: u32) -> u32 {
+    need.saturating_add(need / 4 + 64)
+}
+
+/// Photons that a path leaves behind on average; more are noticed and make the buffers grow.
+const EXPECTED_PHOTONS: f64 = 5.0;
+
+impl Sizes {
+    /// The sizes for a render.
+    pub fn new(config: &RenderConfig, limits: Limits) -> Self {
+        let [width, height] = config.resolution;
+        let pixel_slots = width.div_ceil(TILE) * height.div_ceil(TILE) * TILE * TILE;
+        let fitting = limits.storage_buffer_bytes / size_of::<VisiblePoint>() as u64 / u64::from(pixel_slots);
+        let slots_per_pixel = match config.estimator {
+            Estimator::Ppm if limits.splitting => PPM_SLOTS.min(fitting.max(1) as u32),
+            _ => 1,
+        };
+        let photons_at_most = (limits.storage_buffer_bytes / size_of::<Photon>() as u64) as u32;
+        let batch_paths = config
+            .photons
+            .min((f64::from(photons_at_most) / (2.0 * EXPECTED_PHOTONS)) as u32)
+            .max(1);
+        let mut sizes = Self {
+            resolution: config.resolution,
+            pixel_slots,
+            slots_per_pixel,
+            batch_paths,
+            photon_lanes: 0,
+            lane_capacity: 0,
+            photon_capacity: 0,
+            gather_parts: 1,
+            cell_bits: (batch_paths.ilog2() + 3).clamp(12, 24),
+            meshes: limits.meshes,
+            object_cells: limits.object_cells,
+            glossy: limits.glossy,
+            cell_photons: config.cell_photons,
+            probe: Probe::default(),
+        };
+        sizes.set_lanes(limits.lanes);
+        sizes.shrink_batch(&limits);
+        sizes
+    }
+
+    /// Deals the paths to about `lanes` invocations.
+    pub fn set_lanes(&mut self, lanes: u32) {
+        self.photon_lanes = self.batch_paths.min(lanes.next_multiple_of(64));
+        let paths = f64::from(self.paths_per_lane());
+        // Mean and a few standard deviations of a sum of geometrically distributed lengths.
+        self.lane_capacity = (EXPECTED_PHOTONS * (paths + 3.0 * paths.sqrt())).ceil() as u32;
+        self.photon_capacity = self.lane_photons();
+    }
+
+    /// Makes the photons' buffers fit what a batch was seen to need, with room for chance: kernels have an invocation for
+    /// each place.
+    pub fn fit(&mut self, lane_need: u32, batch_need: u32) {
+        self.lane_capacity = self.lane_capacity.min(lane_need + lane_need / 2 + 8);
+        self.photon_capacity = with_room(batch_need).min(self.lane_photons());
+    }
+
+    /// Makes room for what didn't fit.
+    pub fn grow(&mut self, lane_need: u32, batch_need: u32) {
+        if lane_need > self.lane_capacity {
+            self.lane_capacity = lane_need.saturating_add(lane_need / 4 + 1);
+        }
+        if batch_need > self.photon_capacity {
+            self.photon_capacity = with_room(batch_need);
+        }
+    }
+
+    /// Takes fewer photon paths at once until the photons of a batch fit into one buffer.
+    pub fn shrink_batch(&mut self, limits: &Limits) {
+        let bytes =
+            |sizes: &Self| u64::from(sizes.photon_lanes) * u64::from(sizes.lane_capacity) * size_of::<Photon>() as u64;
+        while bytes(self) > limits.storage_buffer_bytes && self.batch_paths > 1 {
+            let paths = self.paths_per_lane();
+            let capacity = self.lane_capacity;
+            self.batch_paths = self.batch_paths.div_ceil(2);
+            self.photon_lanes = self.batch_paths.div_ceil(paths);
+            self.lane_capacity = capacity;
+        }
+        self.photon_capacity = self.photon_capacity.min(self.lane_photons());
+    }
+
+    /// Photon paths that an invocation follows one after the other, at the most.
+    pub fn paths_per_lane(&self) -> u32 {
+        self.batch_paths.div_ceil(self.photon_lanes)
+    }
+
+    /// Bytes of the buffer `id`; `None` for those that hold the scene.
+    pub fn bytes(&self, id: BufferId) -> Option<u64> {
+        let pixels = u64::from(self.resolution[0]) * u64::from(self.resolution[1]);
+        let slots = u64::from(self.slots());
+        let photons = u64::from(self.photon_capacity);
+        let lanes = u64::from(self.photon_lanes);
+        let tiles = photons.max(slots).div_ceil(u64::from(SORT_TILE));
+        let histograms = tiles << SORT_DIGIT_BITS;
+        let cells = (1u64 << self.cell_bits) + 1;
+        let (meshes, object_cells) = (u64::from(self.meshes), u64::from(self.object_cells) + 1);
+        let runs = u64::from(self.runs());
+        let scanned = [histograms, lanes, cells, meshes, object_cells, runs];
+        let scan_blocks = scanned.map(|count| count.div_ceil(u64::from(SCAN_BLOCK)));
+        let (count, size) = match id {
+            BufferId::VisiblePoints => (slots, size_of::<VisiblePoint>()),
+            BufferId::GlossOf => (if self.glossy { slots } else { 1 }, size_of::<Gloss>()),
+            BufferId::StatisticsOf => (slots, size_of::<Statistics>()),
+            BufferId::GatheredOf => (slots, size_of::<Gathered>()),
+            BufferId::DirectSums => (slots, size_of::<DirectSum>()),
+            BufferId::CoverageOf => (slots, size_of::<Coverage>()),
+            BufferId::TestsOf => (if self.probe.count_tests { slots } else { 1 }, 4),
+            BufferId::RadiusSums => (u64::from(RADIUS_GROUPS), size_of::<RadiusSum>()),
+            BufferId::Film => (pixels, 16),
+            BufferId::Status => (1, size_of::<StatusCounters>()),
+            BufferId::Grid => (1, size_of::<GridShape>()),
+            BufferId::PhotonCount | BufferId::PointCount | BufferId::ScanTotal => (1, 4),
+            BufferId::LanePhotons => (u64::from(self.lane_photons()), size_of::<Photon>()),
+            BufferId::Photons | BufferId::SortedPhotons => (photons, size_of::<Photon>()),
+            BufferId::LaneCounts | BufferId::LaneOffsets => (lanes, 4),
+            BufferId::Keys | BufferId::Values | BufferId::OtherKeys | BufferId::OtherValues => (photons, 4),
+            BufferId::PointKeys | BufferId::PointValues | BufferId::OtherPointKeys | BufferId::OtherPointValues => {
+                (slots, 4)
+            }
+            BufferId::Histograms => (histograms, 4),
+            BufferId::ScanSums => (scan_blocks.into_iter().max().unwrap_or(1), 4),
+            // Whole texels of four.
+            BufferId::CellStarts => (cells.next_multiple_of(4), 4),
+            BufferId::MeshEnds | BufferId::MeshFillers => (meshes, 4),
+            BufferId::ObjectCells | BufferId::ObjectCellCursors => (object_cells, 4),
+            BufferId::MeshOrder | BufferId::ClusterOf => (runs * u64::from(GROUP), 4),
+            BufferId::PointOrder => (u64::from(self.order_groups()) * u64::from(GROUP), 4),
+            BufferId::Centroids => (runs, 16),
+            BufferId::ClusterSizes | BufferId::ClusterStarts => (runs, 4),
+            _ => return None,
+        };
+        Some(count * size as u64)
+    }
+
+    /// Workgroups of visible points of one mesh each, at the most.
+    pub fn runs(&self) -> u32 {
+        // Every mesh's last one may be nearly empty.
+        self.slots().div_ceil(GROUP) + self.meshes.min(self.slots())
+    }
+
+    /// Workgroups of visible points of one cluster each, at the most.
+    pub fn order_groups(&self) -> u32 {
+        self.slots().div_ceil(GROUP) + self.runs()
+    }
+
+    /// Visible points.
+    pub fn slots(&self) -> u32 {
+        self.pixel_slots * self.slots_per_pixel
+    }
+
+    /// Photons that the lanes can store.
+    pub fn lane_photons(&self) -> u32 {
+        self.photon_lanes.saturating_mul(self.lane_capacity)
+    }
+
+    /// Batches of an iteration of `paths` photon paths.
+    pub fn batches(&self, paths: u32) -> u32 {
+        paths.div_ceil(self.batch_paths)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn photon_buffers_stay_within_what_a_device_binds() {
+        for (photons, storage_buffer_bytes, lanes) in [
+            (300_000, 128 << 20, 1 << 18),
+            (10_000_000, 2 << 30, 1 << 18),
+            (10_000_000, 128 << 20, 4096),
+            (1, 1 << 20, 1 << 18),
+        ] {
+            let config = RenderConfig {
+                photons,
+                ..RenderConfig::default()
+            };
+            let limits = Limits {
+                storage_buffer_bytes,
+                loop_limit: u32::MAX,
+                lanes,
+                splitting: false,
+                glossy: false,
+                meshes: 5,
+                object_cells: 500,
+            };
+            let sizes = Sizes::new(&config, limits);
+            for id in [BufferId::LanePhotons, BufferId::Photons, BufferId::SortedPhotons] {
+                let bytes = sizes.bytes(id).expect("a size");
+                assert!(
+                    bytes <= storage_buffer_bytes,
+                    "{photons} paths, {lanes} lanes: {id:?} has {bytes} bytes of {storage_buffer_bytes}"
+                );
+            }
+            assert!(sizes.batches(photons) * sizes.batch_paths >= photons);
+        }
+    }
+}
