@@ -8,6 +8,7 @@ use gpu_allocator::MemoryLocation;
 use super::buffer::Buffer;
 use super::context::{Context, DeviceSummary, Instance, OrVulkan};
 use super::pipeline::Pipelines;
+use super::pipeline_cache::PipelineCache;
 use super::self_check;
 use crate::error::{Error, Result};
 use crate::stage::BufferId;
@@ -81,12 +82,13 @@ impl Device {
             (pool, commands, fence)
         };
         context.name(commands, "commands");
+        let cache = PipelineCache::open(&context, physical)?;
         let mut device = Self {
             summary,
             loop_limit: u32::MAX,
             buffers: HashMap::new(),
             read_back: HashMap::new(),
-            pipelines: Pipelines::default(),
+            pipelines: Pipelines::new(cache),
             pool,
             commands,
             fence,

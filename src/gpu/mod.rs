@@ -7,6 +7,7 @@ mod context;
 mod device;
 mod execute;
 mod pipeline;
+mod pipeline_cache;
 mod self_check;
 
 pub use context::DeviceSummary;

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use ash::vk;
 
 use super::context::{Context, OrVulkan};
+use super::pipeline_cache::PipelineCache;
 use crate::error::{Error, Result};
 use crate::stage::{Access, Shader, StageDesc};
 
@@ -26,8 +27,8 @@ pub(super) struct Pipeline {
 /// A shader's name and its specialisation constants, by id.
 type Key = (&'static str, Vec<(u32, u32)>);
 
-#[derive(Default)]
 pub(super) struct Pipelines {
+    cache: PipelineCache,
     layouts: HashMap<&'static str, Layouts>,
     pipelines: HashMap<Key, Pipeline>,
 }
@@ -41,6 +42,15 @@ pub(super) fn descriptor_type(access: Access) -> vk::DescriptorType {
 }
 
 impl Pipelines {
+    /// None yet.
+    pub fn new(cache: PipelineCache) -> Self {
+        Self {
+            cache,
+            layouts: HashMap::new(),
+            pipelines: HashMap::new(),
+        }
+    }
+
     /// The pipeline for a launch, made when it is first asked for.
     pub fn get(&mut self, context: &Context, stage: &StageDesc) -> Result<Pipeline> {
         let shader = stage.shader;
@@ -83,7 +93,7 @@ impl Pipelines {
         let handle = unsafe {
             context
                 .device
-                .create_compute_pipelines(vk::PipelineCache::null(), &[create], None)
+                .create_compute_pipelines(self.cache.handle, &[create], None)
         }
         .map_err(|(_, code)| Error::Vulkan {
             call: "vkCreateComputePipelines",
@@ -100,6 +110,7 @@ impl Pipelines {
     }
 
     pub fn free(&mut self, context: &Context) {
+        self.cache.free(context);
         // SAFETY: the caller has waited for the work that used them.
         unsafe {
             for pipeline in self.pipelines.values() {

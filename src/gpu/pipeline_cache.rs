@@ -1,0 +1,158 @@
+//! Compiled pipelines in the user's cache folder, so that a driver compiles each kernel once and not in every run.
+//!
+//! A cache is no output: where there is no folder, or it can't be read or written, kernels are compiled anew.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use ash::vk;
+
+use super::context::{Context, OrVulkan};
+use crate::error::Result;
+
+/// Larger files are not what this program wrote.
+const MOST_BYTES: u64 = 256 << 20;
+/// Bytes of the checksum before the driver's own.
+const CHECKSUM: usize = 8;
+
+/// A driver's cache, and the file that it comes from and goes to.
+pub(super) struct PipelineCache {
+    pub handle: vk::PipelineCache,
+    file: Option<PathBuf>,
+    /// What the file had, and has no need to be written again.
+    known: Vec<u8>,
+}
+
+impl PipelineCache {
+    /// Opens the cache of a device; an empty one where the file isn't there, is damaged, or another driver's.
+    pub fn open(context: &Context, physical: vk::PhysicalDevice) -> Result<Self> {
+        // SAFETY: the physical device belongs to the context's instance.
+        let properties = unsafe { context.instance.handle.get_physical_device_properties(physical) };
+        let file = folder().map(|folder| {
+            let uuid: String = properties
+                .pipeline_cache_uuid
+                .iter()
+                .map(|byte| format!("{byte:02x}"))
+                .collect();
+            folder.join(format!("pipelines-{:08x}-{uuid}.bin", properties.driver_version))
+        });
+        let known = file.as_deref().and_then(read).unwrap_or_default();
+        let known = if is_of(&known, &properties) { known } else { Vec::new() };
+        let create = vk::PipelineCacheCreateInfo::default().initial_data(&known);
+        // SAFETY: a plain creation call; `free` destroys what it makes.
+        let handle = unsafe { context.device.create_pipeline_cache(&create, None) };
+        let handle = handle.or_vulkan("vkCreatePipelineCache")?;
+        context.name(handle, "pipelines");
+        Ok(Self { handle, file, known })
+    }
+
+    /// Writes what is new, and destroys the cache.
+    pub fn free(&mut self, context: &Context) {
+        // SAFETY: the caller makes no more pipelines with it.
+        let data = unsafe { context.device.get_pipeline_cache_data(self.handle) };
+        if let (Ok(data), Some(file)) = (data, &self.file)
+            && data != self.known
+        {
+            // Another run may hold the same file: it is replaced as a whole.
+            let _ = write(file, &data);
+        }
+        // SAFETY: as above.
+        unsafe { context.device.destroy_pipeline_cache(self.handle, None) };
+    }
+}
+
+fn folder() -> Option<PathBuf> {
+    let variable = |name| {
+        std::env::var_os(name)
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from)
+    };
+    let cache = variable("XDG_CACHE_HOME").or_else(|| variable("LOCALAPPDATA"));
+    let cache = cache.or_else(|| variable("HOME").map(|home| home.join(".cache")))?;
+    Some(cache.join("ppm-vk"))
+}
+
+/// FNV-1a: tells a file that was cut or changed.
+fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
+    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    hash.to_le_bytes()
+}
+
+/// The driver's part of a file, if it is whole.
+fn read(file: &Path) -> Option<Vec<u8>> {
+    if fs::metadata(file).ok()?.len() > MOST_BYTES {
+        return None;
+    }
+    let mut bytes = fs::read(file).ok()?;
+    let (sum, data) = bytes.split_at_checked(CHECKSUM)?;
+    if checksum(data) != sum {
+        return None;
+    }
+    bytes.drain(..CHECKSUM);
+    Some(bytes)
+}
+
+fn write(file: &Path, data: &[u8]) -> std::io::Result<()> {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let mut temporary = tempfile::NamedTempFile::new_in(folder)?;
+    temporary.write_all(&checksum(data))?;
+    temporary.write_all(data)?;
+    temporary.persist(file)?;
+    Ok(())
+}
+
+/// Whether a cache was made by this device and driver: VkPipelineCacheHeaderVersionOne.
+fn is_of(data: &[u8], properties: &vk::PhysicalDeviceProperties) -> bool {
+    let word = |at: usize| {
+        data.get(at..at + 4)
+            .map(|bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
+    };
+    word(0).is_some_and(|size| size >= 32)
+        && word(4) == Some(vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32)
+        && word(8) == Some(properties.vendor_id)
+        && word(12) == Some(properties.device_id)
+        && data.get(16..32) == Some(&properties.pipeline_cache_uuid[..])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_was_cut_or_changed_is_not_used() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("deep/pipelines.bin");
+        write(&file, b"what a driver wrote").expect("a file");
+        assert_eq!(read(&file).as_deref(), Some(&b"what a driver wrote"[..]));
+        let mut bytes = fs::read(&file).expect("the file");
+        bytes.pop();
+        fs::write(&file, &bytes).expect("a shorter file");
+        assert_eq!(read(&file), None);
+        fs::write(&file, b"short").expect("a short file");
+        assert_eq!(read(&file), None);
+        assert_eq!(read(&folder.path().join("absent")), None);
+    }
+
+    #[test]
+    fn a_cache_of_another_driver_is_not_used() {
+        let properties = vk::PhysicalDeviceProperties {
+            vendor_id: 1,
+            device_id: 2,
+            pipeline_cache_uuid: [3; 16],
+            ..Default::default()
+        };
+        let header = |device: u32, uuid: u8| {
+            let words = [32u32, 1, 1, device].map(u32::to_le_bytes);
+            [words.as_flattened(), &[uuid; 16], b"data"].concat()
+        };
+        assert!(is_of(&header(2, 3), &properties));
+        assert!(!is_of(&header(7, 3), &properties));
+        assert!(!is_of(&header(2, 4), &properties));
+        assert!(!is_of(&header(2, 3)[..20], &properties));
+        assert!(!is_of(&[], &properties));
+    }
+}
