@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::film::Image;
 use crate::layout::Settings;
 use crate::record::Run;
-use crate::scene::{Camera, PackedScene};
+use crate::scene::{Camera, Lens, PackedScene, Projection};
 
 /// A progressive render that is under way.
 pub trait Backend {
@@ -137,14 +137,21 @@ const LARGEST_RADIUS: f64 = 1e6;
 /// is 0 where it has to be found.
 pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loop_limit: u32) -> Settings {
     let [width, height] = config.resolution;
-    let half_height = camera.tan_half_fov;
+    let (half_height, orthographic) = match camera.projection {
+        Projection::Perspective { tan_half_fov } => (tan_half_fov, 0.0),
+        Projection::Orthographic { half_height } => (half_height, 1.0),
+    };
+    let lens = camera.lens.unwrap_or(Lens {
+        radius: 0.0,
+        focus: 1.0,
+    });
     let half_width = half_height * width as f32 / height as f32;
-    let with_zero = |v: glam::Vec3| [v.x, v.y, v.z, 0.0];
+    let with = |v: glam::Vec3, w: f32| [v.x, v.y, v.z, w];
     Settings {
-        camera_position: with_zero(camera.position),
-        camera_right: with_zero(camera.right * half_width),
-        camera_up: with_zero(camera.up * half_height),
-        camera_forward: with_zero(camera.forward),
+        camera_position: with(camera.position, lens.radius),
+        camera_right: with(camera.right * half_width, lens.focus),
+        camera_up: with(camera.up * half_height, orthographic),
+        camera_forward: with(camera.forward, 0.0),
         resolution: config.resolution,
         slots_per_pixel: 1,
         seed: config.seed,

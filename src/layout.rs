@@ -95,11 +95,11 @@ macro_rules! device_structs {
 device_structs! {
     /// What stays the same through a render. Lengths in render units.
     pub struct Settings: 128 {
-        /// xyz: centre of projection.
+        /// xyz: centre of projection; w: radius of the lens.
         pub camera_position: [f32; 4],
-        /// xyz: to the picture's right edge, at distance 1.
+        /// xyz: to the picture's right edge, at distance 1; w: distance along the direction of view of what is in focus.
         pub camera_right: [f32; 4],
-        /// xyz: to the picture's top edge, at distance 1.
+        /// xyz: to the picture's top edge, at distance 1; w: 1 where rays are parallel, else 0.
         pub camera_up: [f32; 4],
         /// xyz: unit vector into the picture.
         pub camera_forward: [f32; 4],
@@ -258,8 +258,8 @@ device_structs! {
         pub alpha_cutoff: f32,
         /// Factor of alpha.
         pub alpha: f32,
-        /// Zero.
-        pub padding: u32,
+        /// 20 over the Abbe number of a dielectric; 0: its index is that of every wavelength.
+        pub dispersion: f32,
     }
 
     /// A light, and a cell of the alias table that chooses one. What its kind doesn't use is zero.

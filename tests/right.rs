@@ -4,6 +4,8 @@
 //! from independent samples, so many that a right program fails a comparison with a probability of 1e-8 or less. The
 //! other bounds the known bias by the photons' radius, from the geometry; each test says how. Seeds are fixed.
 
+#[path = "right/camera.rs"]
+mod camera;
 #[path = "right/convergence.rs"]
 mod convergence;
 #[path = "../examples/make_scenes/scenes/document.rs"]
@@ -30,6 +32,8 @@ mod measure;
 mod mesh;
 #[path = "picture/mod.rs"]
 mod picture;
+#[path = "right/prism.rs"]
+mod prism;
 #[path = "right/references.rs"]
 mod references;
 #[path = "right/stage.rs"]

@@ -12,6 +12,7 @@ layout(constant_id = 14) const bool PUNCTUAL_LIGHTS = false;
 layout(constant_id = 15) const bool ENVIRONMENT = false;
 layout(constant_id = 16) const bool TEXTURED = false;
 layout(constant_id = 17) const bool ALPHA = false;
+layout(constant_id = 18) const bool DISPERSION = false;
 
 const uint MISS = 0xffffffffu;
 
@@ -68,7 +69,7 @@ struct Material {
     uint alpha_mode;
     float alpha_cutoff;
     float alpha;
-    uint padding;
+    float dispersion; // 20 over the Abbe number
 };
 
 const uint MATERIAL_TEXELS = 8u;
@@ -101,9 +102,13 @@ Material material_at(uint i) {
     if (DIELECTRICS) {
         inside = TEXEL_BITS(Materials, MATERIAL_TEXELS * i + 4u);
     }
+    float dispersion = 0.0;
+    if (DISPERSION) {
+        dispersion = TEXEL(Materials, MATERIAL_TEXELS * i + 7u).w;
+    }
     return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, uintBitsToFloat(rest.y),
                     uintBitsToFloat(rest.z), uintBitsToFloat(rest.w), specular.rgb, specular.w,
-                    uintBitsToFloat(inside.xyz), inside.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0u, 0.0, 0.0, 0u);
+                    uintBitsToFloat(inside.xyz), inside.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0u, 0.0, 0.0, dispersion);
 }
 
 bool is_mirror(Material material) {
@@ -118,11 +123,16 @@ bool is_thin(Material material) {
     return THIN_WALLS && material.thin != 0u;
 }
 
+// Whether a surface passes a part of the light only.
+bool is_mixed(Material material) {
+    return PARTLY_CLEAR && is_dielectric(material) && material.transmission * (1.0 - material.metallic) < 1.0;
+}
+
 // A surface that passes a part of the light only is by chance all clear or all glossy; u is a uniform number again after
 // that. Returns whether it has a glossy part.
 bool choose_part(inout Material material, inout float u) {
     float t = material.transmission * (1.0 - material.metallic);
-    bool mixed = PARTLY_CLEAR && is_dielectric(material) && t < 1.0;
+    bool mixed = is_mixed(material);
     if (mixed) {
         material.metallic = min(material.metallic / (1.0 - t), 1.0); // of what isn't clear
         bool clear = u < t;

@@ -15,6 +15,7 @@ layout(local_size_x = 64) in;
 #include "texture.glsl"
 #include "alpha.glsl"
 #include "bsdf.glsl"
+#include "dispersion.glsl"
 #include "contact.glsl"
 #include "environment.glsl"
 #include "light.glsl"
@@ -42,6 +43,7 @@ struct Branch {
     uint depth;
     uint ignored;
     uint medium;          // material that it is in, or VACUUM
+    float wavelength;     // nm; 0: of all
     bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
     bool emission_seen;   // what the next surface emits
 };
@@ -105,14 +107,26 @@ void main() {
     uint pending_count = 0u;
     uint used = 0u;
     Branch branch;
-    branch.origin = settings.camera_position.xyz;
-    branch.direction = normalize(settings.camera_forward.xyz + film.x * settings.camera_right.xyz -
-                                 film.y * settings.camera_up.xyz);
+    vec3 place = film.x * settings.camera_right.xyz - film.y * settings.camera_up.xyz;
+    bool parallel = settings.camera_up.w != 0.0;
+    branch.origin = settings.camera_position.xyz + (parallel ? place : vec3(0.0));
+    branch.direction = settings.camera_forward.xyz + (parallel ? vec3(0.0) : place);
+    float lens_radius = settings.camera_position.w;
+    if (lens_radius > 0.0) {
+        // All rays of a place in the picture meet where it is in focus.
+        float r = lens_radius * sqrt(u.z);
+        float phi = 2.0 * PI * u.w;
+        vec3 off_axis = r * (cos(phi) * normalize(settings.camera_right.xyz) + sin(phi) * normalize(settings.camera_up.xyz));
+        branch.origin += off_axis;
+        branch.direction = settings.camera_right.w * branch.direction - off_axis;
+    }
+    branch.direction = normalize(branch.direction);
     branch.throughput = vec3(1.0);
     branch.emitted = vec3(0.0);
     branch.depth = 0u;
     branch.ignored = MISS;
     branch.medium = VACUUM;
+    branch.wavelength = 0.0;
     branch.reflection_seen = false;
     branch.emission_seen = false;
 
@@ -141,7 +155,7 @@ void main() {
             branch.emission_seen = false;
             // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
             Reflector reflector = Reflector(material.base_color, vec3(0.0), 0.0, 0.0);
-            if (PARTLY_CLEAR) {
+            if (is_mixed(material)) {
                 u = next4(random);
                 choose_part(material, u.x);
             }
@@ -180,6 +194,9 @@ void main() {
                     reflector.alpha = 0.0;
                     ended = stops || largest(branch.throughput) <= 0.0;
                 } else if (DIELECTRICS) {
+                    if (DISPERSION) {
+                        branch.throughput *= disperse(material, branch.wavelength, random);
+                    }
                     Boundary boundary = meet_boundary(facing, branch.direction, material, met.outside, u.yz);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
                     vec3 transmission = met.tint * (boundary.eta * boundary.eta * boundary.refracted_weight);

@@ -17,6 +17,7 @@ layout(local_size_x = 64) in;
 #include "texture.glsl"
 #include "alpha.glsl"
 #include "bsdf.glsl"
+#include "dispersion.glsl"
 #include "contact.glsl"
 #include "environment.glsl"
 #include "light.glsl"
@@ -45,6 +46,7 @@ struct Path {
     uint depth;
     uint ignored;
     uint medium; // material that it is in, or VACUUM
+    float wavelength; // nm; 0: of all
     bool seen_directly; // no specular bounce since the light: direct light, which `direct` samples
     float inverse_range; // of the light, until the first surface
 };
@@ -58,6 +60,7 @@ Path start(inout Random random) {
     path.depth = 0u;
     path.ignored = emission.ignored;
     path.medium = VACUUM;
+    path.wavelength = 0.0;
     path.seen_directly = true;
     path.inverse_range = emission.inverse_range;
     return path;
@@ -65,7 +68,8 @@ Path start(inout Random random) {
 
 // Russian roulette that keeps the photons' powers alike: survives with the ratio of its largest channels.
 bool survives(inout vec3 flux, vec3 scattered, float u) {
-    float probability = min(1.0, largest(scattered) / largest(flux));
+    float arriving = largest(flux);
+    float probability = arriving > 0.0 ? min(1.0, largest(scattered) / arriving) : 0.0;
     if (u >= probability) {
         return false;
     }
@@ -163,6 +167,9 @@ void main() {
             alive = survives(path.flux, path.flux * fresnel_schlick(material.base_color, cos_i), u.z);
             path.direction = mirror_direction(facing, incoming);
         } else if (DIELECTRICS) {
+            if (DISPERSION) {
+                path.flux *= disperse(material, path.wavelength, random);
+            }
             Boundary boundary = meet_boundary(facing, incoming, material, met.outside, u.yw);
             bool reflected = u.x < boundary.reflectance;
             vec3 weight = reflected ? vec3(boundary.reflected_weight) : met.tint * boundary.refracted_weight;

@@ -91,6 +91,12 @@ pub struct RenderArguments {
     /// Exposure of the PNG, in stops.
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
     pub exposure: f32,
+    /// Radius of the camera's lens, in scene units: what isn't in focus is blurred [default: a pinhole].
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
+    pub aperture: Option<f64>,
+    /// Distance along the direction of view of what is in focus, in scene units [default: of the scene's centre].
+    #[arg(long, value_name = "D", requires = "aperture", allow_negative_numbers = true, value_parser = positive)]
+    pub focus: Option<f64>,
     /// Pixels [default: 1280 wide at the camera's aspect ratio].
     #[arg(long, value_name = "WxH", value_parser = resolution)]
     pub resolution: Option<[u32; 2]>,

@@ -13,7 +13,7 @@ use super::outputs::check_outputs;
 use super::progress::{BUILDING, Limits, Progress, READING, while_showing, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
-use crate::config::{RenderConfig, Sampler};
+use crate::config::{Estimator, RenderConfig, Sampler};
 use crate::estimate::{ErrorEstimate, of_one_photon};
 use crate::film::{self, Metadata};
 use crate::gather::{self, METHODS, Runs};
@@ -56,7 +56,11 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     for warning in &scene.warnings {
         say!("warning: {warning}");
     }
-    let camera = &scene.cameras[scene.camera_index(arguments.camera.as_deref())?];
+    let mut camera = scene.cameras[scene.camera_index(arguments.camera.as_deref())?].clone();
+    if let Some(radius) = arguments.aperture {
+        camera.lens = Some(scene.lens(&camera, radius, arguments.focus)?);
+    }
+    let camera = &camera;
     let config = config(arguments, gather, camera);
     let packed = while_showing(BUILDING, quiet, || PackedScene::new(&scene))
         .map_err(|what| crate::error::Error::scene(path, what))?;
@@ -177,6 +181,8 @@ fn choose_backend(arguments: &RenderArguments) -> (BackendChoice, usize) {
         Some("this --gather doesn't run on this --backend; leave one of them out")
     } else if arguments.cell_photons.is_some() && METHODS[method].name != "cluster-grid" {
         Some("--cell-photons is of --gather cluster-grid")
+    } else if arguments.aperture.is_some() && arguments.estimator == Estimator::Ppm {
+        Some("--estimator ppm finds visible points once: it has no --aperture")
     } else if backend == BackendChoice::Cpu && arguments.device.is_some() {
         Some("the CPU backend has no --device")
     } else {

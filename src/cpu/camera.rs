@@ -1,12 +1,13 @@
 //! Camera rays: follows each pixel's path over mirrors and glass to its visible points.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use bytemuck::Zeroable;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::contact::{Encounter, choose_part, transmittance};
+use super::contact::{Encounter, choose_part, is_mixed, transmittance};
+use super::dispersion::disperse;
 use super::environment::Environment;
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
 use super::intersect::Ray;
@@ -31,6 +32,8 @@ struct Branch {
     ignored: Option<u32>,
     /// Material that it is in.
     medium: Option<u32>,
+    /// Of its light, nm.
+    wavelength: Option<f64>,
     /// What a boundary that didn't split the path reflects of the lights' own radiance has been seen.
     reflection_seen: bool,
     /// What the next surface emits has been seen.
@@ -151,20 +154,31 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
     let settings = inputs.settings;
     let [width, _] = settings.resolution;
     let mut random = Random::of_pixel(inputs, PathKind::Camera, pixel[1] * width + pixel[0], iteration);
-    let [jitter_x, jitter_y, ..] = random.next4();
+    let [jitter_x, jitter_y, lens_u, lens_v] = random.next4();
     let [x, y] = match inputs.config.estimator {
         Estimator::Sppm => [jitter_x, jitter_y],
         Estimator::Ppm => [0.5; 2],
     };
     // −1 to 1 from left to right and from top to bottom.
     let film = |pixel: u32, inside: f64, side: u32| (f64::from(pixel) + inside) / f64::from(side) * 2.0 - 1.0;
-    let direction = xyz(settings.camera_forward)
-        + film(pixel[0], x, settings.resolution[0]) * xyz(settings.camera_right)
-        - film(pixel[1], y, settings.resolution[1]) * xyz(settings.camera_up);
+    let (right, up) = (xyz(settings.camera_right), xyz(settings.camera_up));
+    let place = film(pixel[0], x, settings.resolution[0]) * right - film(pixel[1], y, settings.resolution[1]) * up;
+    let [.., lens_radius] = settings.camera_position;
+    let [.., focus] = settings.camera_right;
+    let [.., parallel] = settings.camera_up;
+    let (mut origin, mut direction) = (xyz(settings.camera_position), xyz(settings.camera_forward));
+    *(if parallel != 0.0 { &mut origin } else { &mut direction }) += place;
+    if lens_radius > 0.0 {
+        // All rays of a place in the picture meet where it is in focus.
+        let (sin, cos) = (TAU * lens_v).sin_cos();
+        let off_axis = f64::from(lens_radius) * lens_u.sqrt() * (cos * right.normalize() + sin * up.normalize());
+        origin += off_axis;
+        direction = f64::from(focus) * direction - off_axis;
+    }
 
     let mut pending = vec![Branch {
         ray: Ray {
-            origin: xyz(settings.camera_position),
+            origin,
             direction: direction.normalize(),
         },
         throughput: DVec3::ONE,
@@ -172,6 +186,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
         depth: 0,
         ignored: None,
         medium: None,
+        wavelength: None,
         reflection_seen: false,
         emission_seen: false,
     }];
@@ -200,7 +215,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             }
             branch.emission_seen = false;
             let mut material = surface.material;
-            if inputs.scene.features.partly_clear {
+            if is_mixed(&material) {
                 choose_part(&mut material, random.next4()[0]);
             }
             let kind = material.surface;
@@ -257,6 +272,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
                 facing.reflect(incoming)
             } else {
+                branch.throughput *= disperse(&mut material, &mut branch.wavelength, &mut random);
                 let boundary = Boundary::new(&facing, incoming, &material, met.outside, [second, third]);
                 // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
                 let transmission = met.tint * boundary.eta.powi(2) * boundary.refracted_weight;

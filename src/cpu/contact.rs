@@ -88,11 +88,25 @@ pub(super) fn transmittance(inputs: &Inputs<'_>, medium: Option<u32>, distance: 
     })
 }
 
+/// What part of a surface passes light; 1 for what is no dielectric at all.
+fn clear_part(material: &Material) -> f64 {
+    if material.surface == DIELECTRIC {
+        f64::from(material.transmission) * (1.0 - f64::from(material.metallic))
+    } else {
+        1.0
+    }
+}
+
+/// Whether a surface passes a part of the light only.
+pub(super) fn is_mixed(material: &Material) -> bool {
+    clear_part(material) < 1.0
+}
+
 /// A surface that passes a part of the light only is by chance all clear or all glossy: makes it one of them, and returns
 /// whether it has a glossy part, and a uniform number.
 pub(super) fn choose_part(material: &mut Material, u: f64) -> (bool, f64) {
-    let t = f64::from(material.transmission) * (1.0 - f64::from(material.metallic));
-    if material.surface != DIELECTRIC || t >= 1.0 {
+    let t = clear_part(material);
+    if t >= 1.0 {
         return (false, u);
     }
     // Of what isn't clear.

@@ -13,6 +13,7 @@ mod camera;
 mod contact;
 mod coverage;
 mod direct;
+mod dispersion;
 mod emission;
 mod environment;
 mod gather;

@@ -4,6 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::contact::{Encounter, choose_part, transmittance};
+use super::dispersion::disperse;
 use super::emission::emit;
 use super::gloss::Reflector;
 use super::intersect::Ray;
@@ -53,6 +54,8 @@ struct Path {
     ignored: Option<u32>,
     /// Material that it is in.
     medium: Option<u32>,
+    /// Of its light, nm.
+    wavelength: Option<f64>,
     /// No specular bounce since the light: direct light, which the stage `direct` samples.
     seen_directly: bool,
     /// Of the light, until the first surface.
@@ -62,7 +65,12 @@ struct Path {
 /// Russian roulette that keeps the photons' powers alike: a photon survives with the ratio of the largest channels of
 /// the scattered and the arriving flux. `None` for one that doesn't.
 fn roulette(arriving: DVec3, scattered: DVec3, u: f64) -> Option<DVec3> {
-    let probability = (scattered.max_element() / arriving.max_element()).min(1.0);
+    let arriving = arriving.max_element();
+    let probability = if arriving > 0.0 {
+        (scattered.max_element() / arriving).min(1.0)
+    } else {
+        0.0
+    };
     (u < probability).then(|| scattered / probability)
 }
 
@@ -76,6 +84,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         flux: emission.flux,
         ignored: emission.ignored,
         medium: None,
+        wavelength: None,
         seen_directly: true,
         inverse_range: emission.inverse_range,
     };
@@ -118,7 +127,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
                 });
             }
         }
-        let mut medium = path.medium;
+        let (mut medium, mut wavelength) = (path.medium, path.wavelength);
         let (direction, flux) = if scatters {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             let outgoing = cosine_direction(facing.geometric_normal, choice, second);
@@ -136,6 +145,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             let reflected = path.flux * facing.mirror_reflectance(material.base_color, incoming);
             (facing.reflect(incoming), roulette(path.flux, reflected, survival))
         } else {
+            path.flux *= disperse(&mut material, &mut wavelength, &mut random);
             let boundary = Boundary::new(&facing, incoming, &material, met.outside, [u[1], u[3]]);
             let (direction, weight, side) = match boundary.refracted {
                 Some(refracted) if choice >= boundary.reflectance => {
@@ -155,6 +165,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             flux,
             ignored: Some(surface.triangle),
             medium,
+            wavelength,
             seen_directly: false,
             inverse_range: 0.0,
         };

@@ -1,15 +1,15 @@
-//! Perspective cameras, and the one that stands in where the file has none.
+//! Cameras, and the one that stands in where the file has none.
 
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
-use gltf::json::camera::{Perspective, Type};
+use gltf::json::camera::{Orthographic, Perspective, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Root};
 
 use super::diagnostic::{Check, Warnings, damaged, label, list, quote, shorten};
 use super::graph::{PlacedNode, node_label};
-use super::{Camera, Normalisation, Scene};
+use super::{Camera, Lens, Normalisation, Projection, Scene};
 use crate::error::{Error, Result};
 
 /// Vertical angle of view of the camera that is framed on the bounds, in radians.
@@ -21,7 +21,7 @@ const FRAMED_PITCH: f64 = 15.0 * PI / 180.0;
 /// Free space around the bounds in its picture, as a factor of its distance.
 const FRAMED_MARGIN: f64 = 1.05;
 
-/// The perspective cameras of the nodes, in render space. Others are skipped with a warning.
+/// The cameras of the nodes, in render space.
 pub(super) fn cameras(
     root: &Root,
     nodes: &[PlacedNode<'_>],
@@ -42,17 +42,12 @@ pub(super) fn cameras(
             ))
         })?;
         let label = label("camera", index, camera.name.as_deref());
-        let Some(perspective) = perspective(camera).map_err(|what| format!("{label}: {what}"))? else {
-            warnings.push(format!(
-                "{label}: it is orthographic, which isn't supported yet, and is skipped"
-            ));
-            continue;
-        };
+        let (projection, aspect) = projection(camera, normalisation).map_err(|what| format!("{label}: {what}"))?;
         let name = match camera.name.as_deref().or(placed.node.name.as_deref()) {
             Some(name) => shorten(name),
             None => format!("camera {}", cameras.len()),
         };
-        match place(name, perspective, placed, normalisation).map_err(|what| format!("{label}: {what}"))? {
+        match place(name, (projection, aspect), placed, normalisation).map_err(|what| format!("{label}: {what}"))? {
             Some(camera) => cameras.push(camera),
             None => warnings.push(format!(
                 "{label}: {} leaves it no direction (a scale of zero), and it is skipped",
@@ -63,28 +58,22 @@ pub(super) fn cameras(
     Ok(cameras)
 }
 
-/// The camera's perspective projection, or `None` if it is orthographic.
-fn perspective(camera: &json::Camera) -> Check<Option<&Perspective>> {
+/// What the camera shows, and width over height where the file gives it. Clipping planes play no part.
+fn projection(camera: &json::Camera, normalisation: Normalisation) -> Check<(Projection, Option<f32>)> {
     match camera.type_ {
-        Checked::Valid(Type::Orthographic) => Ok(None),
+        Checked::Valid(Type::Orthographic) => match &camera.orthographic {
+            Some(orthographic) => of_orthographic(orthographic, normalisation),
+            None => Err(damaged("its type is orthographic, but it has no such projection")),
+        },
         Checked::Valid(Type::Perspective) => match &camera.perspective {
-            Some(perspective) => Ok(Some(perspective)),
+            Some(perspective) => of_perspective(perspective),
             None => Err(damaged("its type is perspective, but it has no such projection")),
         },
         Checked::Invalid => Err(damaged("its type is neither perspective nor orthographic")),
     }
 }
 
-/// The camera at a node; `None` if the node's transform leaves it no direction. Clipping planes play no part.
-///
-/// Lengths of axes are ignored. Ancestors that mirror turn the direction of view with the scene, but the picture stays
-/// right-handed: that is what splitting the global transform into translation, rotation and scale gives.
-fn place(
-    name: String,
-    perspective: &Perspective,
-    placed: &PlacedNode<'_>,
-    normalisation: Normalisation,
-) -> Check<Option<Camera>> {
+fn of_perspective(perspective: &Perspective) -> Check<(Projection, Option<f32>)> {
     let fov = f64::from(perspective.yfov);
     let tan_half_fov = (0.5 * fov).tan() as f32;
     // An angle near zero has a tangent that f32 can't hold.
@@ -100,6 +89,33 @@ fn place(
             "its aspectRatio is {aspect}, but it must be positive; correct it in the file"
         ));
     }
+    Ok((Projection::Perspective { tan_half_fov }, perspective.aspect_ratio))
+}
+
+/// Negative magnifications, which the specification discourages, are taken by their size.
+fn of_orthographic(orthographic: &Orthographic, normalisation: Normalisation) -> Check<(Projection, Option<f32>)> {
+    let [width, height] = [orthographic.xmag, orthographic.ymag].map(f32::abs);
+    let half_height = (f64::from(height) * normalisation.scale) as f32;
+    let aspect = width / height;
+    if !(half_height.is_normal() && aspect.is_normal()) {
+        return Err(format!(
+            "its xmag is {} and its ymag {}, but neither may be 0 or infinite; correct them in the file",
+            orthographic.xmag, orthographic.ymag
+        ));
+    }
+    Ok((Projection::Orthographic { half_height }, Some(aspect)))
+}
+
+/// The camera at a node; `None` if the node's transform leaves it no direction.
+///
+/// Lengths of axes are ignored. Ancestors that mirror turn the direction of view with the scene, but the picture stays
+/// right-handed: that is what splitting the global transform into translation, rotation and scale gives.
+fn place(
+    name: String,
+    (projection, aspect): (Projection, Option<f32>),
+    placed: &PlacedNode<'_>,
+    normalisation: Normalisation,
+) -> Check<Option<Camera>> {
     let to_world = placed.unscaled_to_world;
     let position = normalisation.to_render(to_world.translation);
     if !position.is_finite() {
@@ -115,8 +131,9 @@ fn place(
         right,
         up,
         forward,
-        tan_half_fov,
-        aspect: perspective.aspect_ratio,
+        projection,
+        aspect,
+        lens: None,
     }))
 }
 
@@ -152,12 +169,39 @@ pub(super) fn framed_on((lower, upper): (Vec3, Vec3)) -> Camera {
         right: right.as_vec3(),
         up: up.as_vec3(),
         forward: forward.as_vec3(),
-        tan_half_fov: tan as f32,
+        projection: Projection::Perspective {
+            tan_half_fov: tan as f32,
+        },
         aspect: None,
+        lens: None,
     }
 }
 
 impl Scene {
+    /// A lens for a camera; radius and the distance along its direction of view of what is in focus in scene units. Without the
+    /// distance the centre of the scene's bounds is in focus.
+    ///
+    /// # Errors
+    /// [`Error::Config`], if that lies behind the camera.
+    pub fn lens(&self, camera: &Camera, radius: f64, focus: Option<f64>) -> Result<Lens> {
+        let scale = self.normalisation.scale;
+        let (lower, upper) = self.bounds();
+        let centre = 0.5 * (lower + upper);
+        let focus = focus.map_or((centre - camera.position).dot(camera.forward), |focus| {
+            (focus * scale) as f32
+        });
+        if focus > 0.0 && focus.is_finite() {
+            Ok(Lens {
+                radius: (radius * scale) as f32,
+                focus,
+            })
+        } else {
+            Err(Error::Config(
+                "--aperture: the centre of the scene lies behind the camera; say what is in focus by --focus".into(),
+            ))
+        }
+    }
+
     /// Index into [`Scene::cameras`] of the camera with that name or, if none has it, that number. `None` is the first.
     ///
     /// # Errors

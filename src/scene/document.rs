@@ -17,8 +17,9 @@ use super::{glb, meshopt};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 9] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 10] = [
     "KHR_lights_punctual",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",

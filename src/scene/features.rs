@@ -29,6 +29,8 @@ pub struct SceneFeatures {
     pub partly_clear: bool,
     /// Dielectrics that absorb light inside.
     pub absorption: bool,
+    /// Dielectrics that bend each wavelength its own way.
+    pub dispersion: bool,
     /// Boundaries of dielectrics that lie on faces of other objects.
     pub contact: bool,
     /// Lights that are points or directions.
@@ -51,6 +53,7 @@ impl SceneFeatures {
         thin_walls: true,
         partly_clear: true,
         absorption: true,
+        dispersion: true,
         contact: true,
         punctual: true,
         environment: true,
@@ -75,6 +78,7 @@ impl SceneFeatures {
             features.thin_walls |= glass && material.thin != 0;
             features.partly_clear |= mixed;
             features.absorption |= glass && material.absorption != [0.0; 3];
+            features.dispersion |= glass && material.dispersion > 0.0;
             features.textured |= triangle.flags & TEXTURED != 0;
             features.alpha |= triangle.flags & SEE_THROUGH != 0;
             features.contact |= triangle.flags & TOUCHED != 0;
@@ -87,7 +91,7 @@ impl SceneFeatures {
     }
 
     /// Each feature's constant in the kernels, and its value.
-    pub fn constants(self) -> [(&'static str, bool); 12] {
+    pub fn constants(self) -> [(&'static str, bool); 13] {
         [
             ("MIRRORS", self.mirror),
             ("DIELECTRICS", self.dielectric),
@@ -96,6 +100,7 @@ impl SceneFeatures {
             ("THIN_WALLS", self.thin_walls),
             ("PARTLY_CLEAR", self.partly_clear),
             ("ABSORPTION", self.absorption),
+            ("DISPERSION", self.dispersion),
             ("CONTACT", self.contact),
             ("PUNCTUAL_LIGHTS", self.punctual),
             ("ENVIRONMENT", self.environment),
@@ -104,9 +109,62 @@ impl SceneFeatures {
         ]
     }
 
+    /// Those of these values, in the order of [`SceneFeatures::constants`].
+    pub fn of_constants(values: [bool; 13]) -> Self {
+        let [
+            mirror,
+            dielectric,
+            glossy,
+            rough_glass,
+            thin_walls,
+            partly_clear,
+            absorption,
+            dispersion,
+            contact,
+            punctual,
+            environment,
+            textured,
+            alpha,
+        ] = values;
+        Self {
+            mirror,
+            dielectric,
+            glossy,
+            rough_glass,
+            thin_walls,
+            partly_clear,
+            absorption,
+            dispersion,
+            contact,
+            punctual,
+            environment,
+            textured,
+            alpha,
+        }
+    }
+
+    /// A constant's name for people.
+    pub fn spell(constant: &str) -> String {
+        constant.to_lowercase().replace('_', " ")
+    }
+
     /// Names of those that the scene has.
     pub fn names(self) -> Vec<String> {
         let present = self.constants().into_iter().filter(|(_, present)| *present);
-        present.map(|(name, _)| name.to_lowercase().replace('_', " ")).collect()
+        present.map(|(name, _)| Self::spell(name)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_in_the_order_of_the_constants_are_the_same_features() {
+        for index in 0..SceneFeatures::ALL.constants().len() {
+            let values = std::array::from_fn(|other| other == index);
+            let constants = SceneFeatures::of_constants(values).constants();
+            assert_eq!(constants.map(|(_, value)| value), values);
+        }
     }
 }

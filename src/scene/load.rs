@@ -95,7 +95,7 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         warnings: Vec::new(),
     };
     if scene.cameras.is_empty() {
-        warnings.push("it has no perspective camera; one that is framed on its bounds is used".into());
+        warnings.push("it has no camera; one that is framed on its bounds is used".into());
         scene.cameras.push(camera::framed_on(scene.bounds()));
     }
     if scene.environment.is_none() && scene.lights.is_empty() && scene.emissive_triangles().is_empty() {

@@ -128,6 +128,8 @@ impl Reader<'_> {
             gloss,
             thin,
             absorption: volume.filter(|_| !thin).map_or(Vec3::ZERO, absorption),
+            // A thin wall doesn't bend light.
+            dispersion: if thin { 0.0 } else { self.dispersion()? },
         }))
     }
 
@@ -146,6 +148,17 @@ impl Reader<'_> {
             ));
         }
         Ok(ior)
+    }
+
+    /// Of KHR_materials_dispersion, which the `gltf` crate doesn't know.
+    fn dispersion(&self) -> Check<f32> {
+        let extension = self.extension(|extensions| extensions.others.get("KHR_materials_dispersion"));
+        let dispersion = extension
+            .and_then(|extension| extension.get("dispersion"))
+            .map_or(Some(0.0), |it| it.as_f64());
+        let dispersion = dispersion.ok_or_else(|| damaged("its dispersion isn't a number"))?;
+        let [dispersion] = not_negative("dispersion", [dispersion as f32])?;
+        Ok(dispersion)
     }
 
     fn emission(&mut self) -> Check<Vec3> {

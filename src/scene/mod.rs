@@ -94,6 +94,8 @@ pub struct Dielectric {
     pub thin: bool,
     /// Absorption coefficient inside, linear RGB, 1/render unit.
     pub absorption: Vec3,
+    /// 20 over the Abbe number; 0: the index is that of every wavelength.
+    pub dispersion: f32,
 }
 
 impl Dielectric {
@@ -106,6 +108,7 @@ impl Dielectric {
             gloss: Gloss::default(),
             thin: false,
             absorption: Vec3::ZERO,
+            dispersion: 0.0,
         }
     }
 }
@@ -200,7 +203,31 @@ pub struct Triangle {
     pub object: u32,
 }
 
-/// A pinhole camera in render space.
+/// What a camera's picture shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// What lies within an angle.
+    Perspective {
+        /// Tangent of half the vertical angle of view.
+        tan_half_fov: f32,
+    },
+    /// What lies within a height.
+    Orthographic {
+        /// Half of it, in render units.
+        half_height: f32,
+    },
+}
+
+/// What makes things out of focus blurred.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// Its radius, in render units.
+    pub radius: f32,
+    /// Distance along the direction of view of what is in focus, in render units.
+    pub focus: f32,
+}
+
+/// A camera in render space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// Name in the file, or `camera N`.
@@ -213,10 +240,12 @@ pub struct Camera {
     pub up: Vec3,
     /// Unit vector into the picture.
     pub forward: Vec3,
-    /// Tangent of half the vertical angle of view.
-    pub tan_half_fov: f32,
+    /// What it shows.
+    pub projection: Projection,
     /// Width over height where the file gives it.
     pub aspect: Option<f32>,
+    /// Its lens; a pinhole has none.
+    pub lens: Option<Lens>,
 }
 
 /// A scene, ready to render.

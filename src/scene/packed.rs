@@ -199,7 +199,7 @@ fn material(material: &super::Material) -> Material {
         alpha_mode,
         alpha_cutoff,
         alpha,
-        padding: 0,
+        dispersion: inside.dispersion,
     }
 }
 

@@ -18,7 +18,7 @@ use crate::picture::{Subject, small};
 use crate::stage::{faceted, subject};
 
 /// Photon paths: so many that each of the lanes has as many as any other.
-const PATHS: u32 = 65_536;
+pub const PATHS: u32 = 65_536;
 
 pub fn xyz([x, y, z, _]: [f32; 4]) -> DVec3 {
     dvec3(x.into(), y.into(), z.into())
@@ -47,7 +47,7 @@ fn config(direct: Direct) -> RenderConfig {
 }
 
 /// The lanes of an iteration, on the device and on the CPU.
-fn on_both(subject: &Subject, config: &RenderConfig) -> [(&'static str, Vec<Vec<Photon>>); 2] {
+pub fn on_both(subject: &Subject, config: &RenderConfig) -> [(&'static str, Vec<Vec<Photon>>); 2] {
     let mut renderer = subject.renderer(config.clone());
     renderer.iterate().expect("iteration");
     assert_eq!(

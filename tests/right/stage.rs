@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fs;
 
 use glam::{DVec3, dvec3};
-use ppm_vk::scene::{Environment, LoadOptions, Scene};
+use ppm_vk::scene::{Environment, LoadOptions, Projection, Scene};
 use tempfile::TempDir;
 
 use crate::document::Document;
@@ -65,7 +65,10 @@ pub fn walls(half_side: f64, bottom: f64, top: f64) -> [Mesh; 4] {
 pub fn camera_ray(subject: &Subject, side: usize, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
     let camera = &subject.scene.cameras[0];
     let normalisation = subject.scene.normalisation;
-    let film = |at: f64| (2.0 * at / side as f64 - 1.0) * f64::from(camera.tan_half_fov);
+    let Projection::Perspective { tan_half_fov } = camera.projection else {
+        panic!("{:?}", camera.projection);
+    };
+    let film = |at: f64| (2.0 * at / side as f64 - 1.0) * f64::from(tan_half_fov);
     let direction = camera.forward.as_dvec3() + film(x) * camera.right.as_dvec3() - film(y) * camera.up.as_dvec3();
     let origin = camera.position.as_dvec3() / normalisation.scale + normalisation.centre;
     (origin, direction.normalize())

@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use glam::Vec3;
-use ppm_vk::scene::Camera;
+use ppm_vk::scene::{Camera, Projection};
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_close};
@@ -15,17 +15,22 @@ fn assert_frame(camera: &Camera, right: [f32; 3], up: [f32; 3], forward: [f32; 3
     assert_close(camera.forward, forward);
 }
 
+#[track_caller]
+fn tan_half_fov(camera: &Camera) -> f32 {
+    match camera.projection {
+        Projection::Perspective { tan_half_fov } => tan_half_fov,
+        projection => panic!("{projection:?}"),
+    }
+}
+
 #[test]
 fn a_camera_looks_along_minus_z_with_y_up() {
     let scene = Fixture::room().scene();
     let camera = &scene.cameras[0];
     assert_frame(camera, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]);
     assert_close(camera.position, [0.0, 0.0, 4.0]);
-    assert!(
-        (camera.tan_half_fov - 0.5f32.tan()).abs() < 1e-6,
-        "{}",
-        camera.tan_half_fov
-    );
+    let tan_half_fov = tan_half_fov(camera);
+    assert!((tan_half_fov - 0.5f32.tan()).abs() < 1e-6, "{tan_half_fov}");
     assert_eq!(camera.aspect, Some(2.0));
     assert_eq!(
         camera.name, "eye",
@@ -116,16 +121,51 @@ fn a_camera_without_a_direction_is_skipped_with_a_warning() {
 }
 
 #[test]
-fn orthographic_cameras_are_skipped_with_a_warning() {
+fn an_orthographic_camera_shows_twice_its_magnifications() {
     let mut room = Fixture::room();
     room.set(
         "/cameras/-",
         json!({"name": "plan", "type": "orthographic",
-               "orthographic": {"xmag": 1, "ymag": 1, "zfar": 10, "znear": 0.1}}),
+               "orthographic": {"xmag": 3, "ymag": -2, "zfar": 10, "znear": 0.1}}),
     );
     room.add_root(json!({"camera": 1}));
-    let scene = room.assert_warns(&["camera 1 \"plan\"", "orthographic", "skipped"]);
-    assert_eq!(scene.cameras.len(), 1);
+    let scene = room.scene();
+    let camera = &scene.cameras[1];
+    let half_height = 2.0 * scene.normalisation.scale as f32;
+    assert_eq!(camera.projection, Projection::Orthographic { half_height });
+    assert_eq!((camera.name.as_str(), camera.aspect), ("plan", Some(1.5)));
+    for (projection, part) in [
+        (json!({"xmag": 0, "ymag": 1, "zfar": 10, "znear": 0.1}), "xmag is 0"),
+        (json!({"xmag": 1, "ymag": 1e-40, "zfar": 10, "znear": 0.1}), "ymag"),
+    ] {
+        room.set("/cameras/1/orthographic", projection);
+        room.assert_fails(&["camera 1 \"plan\"", part]);
+    }
+    room.remove("/cameras/1/orthographic");
+    room.assert_fails(&["camera 1 \"plan\"", "no such projection"]);
+}
+
+#[test]
+fn a_lens_is_focused_on_the_centre_of_the_scene_or_where_it_is_told() {
+    let scene = Fixture::room().scene();
+    let camera = &scene.cameras[0];
+    let scale = scene.normalisation.scale as f32;
+    let close = |found: f32, expected: f32| (found / expected - 1.0).abs() < 1e-5;
+    let told = scene.lens(camera, 0.1, Some(3.0)).expect("a lens");
+    assert!(
+        close(told.radius, 0.1 * scale) && close(told.focus, 3.0 * scale),
+        "{told:?}"
+    );
+    let (lower, upper) = scene.bounds();
+    let by_itself = scene.lens(camera, 0.1, None).expect("a lens");
+    let depth = (0.5 * (lower + upper) - camera.position).dot(camera.forward);
+    assert!(close(by_itself.focus, depth), "{by_itself:?}");
+    let turned = Camera {
+        forward: -camera.forward,
+        ..camera.clone()
+    };
+    let error = scene.lens(&turned, 0.1, None).expect_err("an error").to_string();
+    assert!(error.contains("--focus"), "{error}");
 }
 
 #[test]
@@ -134,7 +174,7 @@ fn without_a_camera_the_bounds_are_framed_with_a_warning() {
         let mut room = Fixture::room();
         room.set("/scenes/0/nodes", json!([0, 1]));
         room.add_parent(json!({"scale": scale}));
-        let scene = room.assert_warns(&["no perspective camera", "framed"]);
+        let scene = room.assert_warns(&["no camera", "framed"]);
         let camera = &scene.cameras[0];
         assert!(
             camera.forward.z < -0.9 && camera.forward.y < 0.0,
@@ -152,7 +192,7 @@ fn without_a_camera_the_bounds_are_framed_with_a_warning() {
                 }
             };
             let offset = Vec3::new(pick(0), pick(1), pick(2)) - camera.position;
-            let depth = offset.dot(camera.forward) * camera.tan_half_fov;
+            let depth = offset.dot(camera.forward) * tan_half_fov(camera);
             assert!(depth > 0.0, "{scale:?}: a corner lies behind the camera");
             fullest = fullest.max(offset.dot(camera.up).abs() / depth);
             fullest = fullest.max(offset.dot(camera.right).abs() / depth);

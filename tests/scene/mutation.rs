@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use ppm_vk::error::Result;
-use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::scene::{PackedScene, Projection, Scene};
 use serde_json::{Value, json};
 
 use crate::allocations::peak_of;
@@ -72,7 +72,11 @@ fn assert_sound(scene: &Scene) {
         assert!(!object.triangles.is_empty() && (object.material as usize) < scene.materials.len());
     }
     for camera in &scene.cameras {
-        assert!(camera.position.is_finite() && camera.tan_half_fov > 0.0 && camera.tan_half_fov.is_finite());
+        let size = match camera.projection {
+            Projection::Perspective { tan_half_fov } => tan_half_fov,
+            Projection::Orthographic { half_height } => half_height,
+        };
+        assert!(camera.position.is_finite() && size > 0.0 && size.is_finite());
     }
     for light in scene.emissive_triangles() {
         assert!(light.power > 0.0 && light.power.is_finite());
