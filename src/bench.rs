@@ -4,6 +4,7 @@
 //! times are device timestamps, and of repeated runs the median counts.
 
 mod converge;
+mod features;
 mod gather;
 mod paper;
 mod plot;
@@ -13,6 +14,7 @@ mod structure;
 mod tables;
 
 pub use converge::{Converge, Convergence, Curve, Measured, Reached, converge, converge_table, csv, seconds_to};
+pub use features::{AddedFeature, FeatureCosts, feature_costs, features_table};
 pub use gather::{GatherBench, MethodResult, ResolutionResult, Results, StepTimes};
 pub use plot::{plot_convergence, plot_methods, plot_scaling};
 pub use random::{Across, Battery, ChiSquare, LIMIT, battery, battery_table};

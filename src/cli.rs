@@ -44,6 +44,7 @@ pub fn run() -> Result<Outcome> {
         Some(Command::Devices { json }) => print(&list::devices(json)?),
         Some(Command::Bench(args::Bench::Gather(arguments))) => bench::gather(&arguments),
         Some(Command::Bench(args::Bench::Random(arguments))) => bench::random(&arguments),
+        Some(Command::Bench(args::Bench::Features(arguments))) => bench::features(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Converge(arguments)) => converge::run(&arguments),
         Some(Command::Gathers) => print(&list::gathers()?),

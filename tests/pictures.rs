@@ -9,6 +9,7 @@ use ppm_vk::config::{Accel, Direct, RenderConfig};
 use ppm_vk::gather;
 use ppm_vk::gpu::Device;
 use ppm_vk::metrics::{Defects, compare, defects};
+use ppm_vk::scene::SceneFeatures;
 
 use picture::{Subject, reference, small};
 
@@ -25,6 +26,20 @@ fn assert_matches_reference(name: &str, direct: Direct, iterations: u32, rel_mse
         "{name}: relMSE {} instead of {rel_mse} at most",
         comparison.rel_mse
     );
+}
+
+/// Kernels that know every feature, or those that a scene has: a matter of speed alone.
+#[test]
+fn all_features_compiled_in_give_the_same_picture() {
+    for name in ["cornell", "cornell-spheres", "glasses", "textures"] {
+        let mut subject = Subject::named(name);
+        let own = subject.render(4, small(64, 20_000));
+        subject.packed.features = SceneFeatures::ALL;
+        let with_all = subject.render(4, small(64, 20_000));
+        let comparison = compare(&with_all, &own).expect("sizes");
+        println!("{name}: {comparison:?}");
+        assert!(comparison.rel_mse < 1e-5, "{name}: {comparison:?}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::bench::{BenchGather, BenchRandom};
+use super::bench::{BenchFeatures, BenchGather, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
 use crate::config::{Accel, Direct, Estimator, Sampler, TriangleTest};
@@ -61,6 +61,8 @@ pub enum Bench {
     Gather(Box<BenchGather>),
     /// How random the numbers are that paths draw: χ² of tuples. Exits with 1 if independent ones aren't.
     Random(BenchRandom),
+    /// What each feature costs that a scene doesn't need.
+    Features(BenchFeatures),
 }
 
 /// What computes.

@@ -156,6 +156,57 @@ pub fn random(arguments: &BenchRandom) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+/// `ppm-vk bench features`.
+#[derive(Debug, Args)]
+pub struct BenchFeatures {
+    /// glTF file [default: a Cornell box].
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Pixels.
+    #[arg(long, value_name = "WxH", default_value = "256x256", value_parser = resolution)]
+    resolution: [u32; 2],
+    /// Photon paths emitted in an iteration.
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    photons: u32,
+    /// Iterations of each; medians count.
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
+    repeats: u32,
+    /// Vulkan device, by a part of its name or its index [default: the best].
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+    /// As JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Measures what features cost that a scene doesn't need, prints the table.
+pub fn features(arguments: &BenchFeatures) -> Result<Outcome> {
+    let scene = load(arguments.scene.as_deref())?;
+    let packed = PackedScene::new(&scene).map_err(anyhow::Error::msg)?;
+    let config = RenderConfig {
+        resolution: arguments.resolution,
+        photons: arguments.photons,
+        ..RenderConfig::default()
+    };
+    let note = |what: &str| {
+        say!("bench: {what}");
+    };
+    let costs = bench::feature_costs(
+        &packed,
+        &scene.cameras[0],
+        arguments.device.as_deref(),
+        &config,
+        arguments.repeats,
+        &note,
+    )?;
+    if arguments.json {
+        print(&(serde_json::to_string_pretty(&costs)? + "\n"))?;
+    } else {
+        print(&bench::features_table(&costs))?;
+    }
+    Ok(Outcome::Done)
+}
+
 fn resolutions(arguments: &BenchGather) -> Vec<[u32; 2]> {
     match arguments.resolution.as_slice() {
         [] if arguments.scaling => vec![[320, 280]],
