@@ -17,13 +17,14 @@ use super::{glb, meshopt};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 10] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 11] = [
     "KHR_lights_punctual",
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
     "KHR_materials_transmission",
+    "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_texture_transform",
     QUANTIZATION,

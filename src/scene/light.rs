@@ -50,7 +50,7 @@ impl Scene {
             let material = &self.materials[object.material as usize];
             let radiance = material.emission.as_dvec3().element_sum() / 3.0;
             let sides = if material.double_sided { 2.0 } else { 1.0 };
-            (radiance > 0.0).then_some((object, radiance * PI * sides))
+            (radiance > 0.0 && !material.unlit).then_some((object, radiance * PI * sides))
         });
         emitting
             .flat_map(|(object, exitance)| {

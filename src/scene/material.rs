@@ -40,6 +40,10 @@ pub(super) fn materials(
         let mut material = reader.read(index).map_err(|what| format!("{label}: {what}"))?;
         if used[index] {
             material.textures = reader.textures(textures).map_err(|what| format!("{label}: {what}"))?;
+            if material.unlit {
+                // The one colour that it has.
+                material.textures.emission = material.textures.base_color;
+            }
             for warning in reader.warnings {
                 warnings.push(format!("{label}: {warning}"));
             }
@@ -60,15 +64,23 @@ impl Reader<'_> {
         let [red, green, blue, alpha] = self.json.pbr_metallic_roughness.base_color_factor.0;
         let [alpha] = self.fractions("alpha of its baseColorFactor", [alpha])?;
         let base_color = self.fractions("baseColorFactor", [red, green, blue])?;
+        let unlit = self.extension(|extensions| extensions.unlit.as_ref()).is_some();
+        let (surface, emission) = (self.surface()?, self.emission()?);
+        let (surface, base_color, emission) = if unlit {
+            (Surface::Matte, Vec3::ZERO, base_color.into())
+        } else {
+            (surface, base_color.into(), emission)
+        };
         Ok(Material {
             name: match &self.json.name {
                 Some(name) => shorten(name),
                 None => format!("material {index}"),
             },
-            surface: self.surface()?,
-            base_color: base_color.into(),
-            emission: self.emission()?,
-            double_sided: self.json.double_sided,
+            surface,
+            base_color,
+            emission,
+            double_sided: self.json.double_sided || unlit,
+            unlit,
             alpha: match self.json.alpha_mode {
                 Checked::Valid(AlphaMode::Opaque) => Alpha::Opaque,
                 Checked::Valid(AlphaMode::Mask) => Alpha::Mask {

@@ -177,6 +177,8 @@ pub struct Material {
     pub emission: Vec3,
     /// Whether the back side emits as well. (Every surface scatters on both sides.)
     pub double_sided: bool,
+    /// KHR_materials_unlit: it is seen as its emission, but lights nothing and reflects nothing.
+    pub unlit: bool,
     /// Where it is there.
     pub alpha: Alpha,
     /// Its textures.

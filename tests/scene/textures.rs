@@ -129,6 +129,24 @@ fn textures_that_do_not_exist_are_refused() {
 }
 
 #[test]
+fn what_is_unlit_shows_its_base_color_and_is_no_light() {
+    let mut material = with_base_color(json!({"index": 0}));
+    material["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.5, 0.25, 1, 1]);
+    material["emissiveFactor"] = json!([1, 1, 1]);
+    material["extensions"] = json!({"KHR_materials_unlit": {}});
+    let scene = textured(material).scene();
+    let floor = &scene.materials[0];
+    assert_eq!(
+        (floor.base_color.to_array(), floor.emission.to_array()),
+        ([0.0; 3], [0.5, 0.25, 1.0])
+    );
+    assert_eq!(floor.textures.emission, floor.textures.base_color);
+    let lamps = scene.emissive_triangles();
+    let of_floor = |triangle: u32| scene.objects[scene.triangles[triangle as usize].object as usize].material == 0;
+    assert!(!lamps.is_empty() && !lamps.iter().any(|lamp| of_floor(lamp.triangle)), "{lamps:?}");
+}
+
+#[test]
 fn alpha_is_as_the_file_says() {
     let with = |more: Value| {
         let mut material = json!({"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": [1, 1, 1, 0.25]}});
