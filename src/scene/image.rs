@@ -12,8 +12,8 @@ use super::document::Document;
 
 /// Longest side of an image, in texels: sides are stored as 16 bits.
 const LONGEST_SIDE: u32 = 32_768;
-/// What decoding may take, in bytes.
-const MOST_MEMORY: u64 = 4 << 30;
+/// What decoding may take beside the result, in bytes for each texel: 16-bit channels, and rows of filters.
+const MEMORY_A_TEXEL: u64 = 16;
 
 /// Pixels of an image, RGBA, as the file has them, in rows from the top left. What has more than 8 bits is rounded to them.
 pub(super) struct Pixels {
@@ -23,10 +23,10 @@ pub(super) struct Pixels {
 }
 
 impl Pixels {
-    /// Reads an image of `document`, whose file is in `folder`.
-    pub(super) fn read(document: &Document, image: &json::Image, folder: &Path) -> Check<Self> {
+    /// Reads an image of `document`, whose file is in `folder`, of so many texels at the most.
+    pub(super) fn read(document: &Document, image: &json::Image, folder: &Path, most: u64) -> Check<Self> {
         match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => Self::decode(&read_uri(uri, folder)?),
+            (Some(uri), _) => Self::decode(&read_uri(uri, folder)?, most),
             (None, Some(view)) => {
                 let views = &document.root.buffer_views;
                 let json = views.get(view.value()).ok_or_else(|| {
@@ -35,27 +35,34 @@ impl Pixels {
                         views.len()
                     ))
                 })?;
-                Self::decode(document.view_bytes(view.value(), json)?)
+                Self::decode(document.view_bytes(view.value(), json)?, most)
             }
             (None, None) => Err(damaged("it has neither a uri nor a bufferView")),
         }
     }
 
-    fn decode(bytes: &[u8]) -> Check<Self> {
+    fn decode(bytes: &[u8], most: u64) -> Check<Self> {
         let unreadable = |error| format!("it can't be decoded ({error}); export it as PNG or JPEG");
         let format = match image::guess_format(bytes) {
             Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
             Ok(other) => return Err(format!("it is {other:?}, but only PNG and JPEG are read; convert it")),
             Err(_) => return Err("it is neither PNG nor JPEG; convert it".into()),
         };
-        let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+        let reader = || ImageReader::with_format(Cursor::new(bytes), format);
+        // A few bytes can claim to be any number of texels: ask before there is memory for them.
+        let (width, height) = reader().into_dimensions().map_err(unreadable)?;
+        let texels = u64::from(width) * u64::from(height);
+        if width.max(height) > LONGEST_SIDE || texels > most {
+            return Err(format!(
+                "it has {width}x{height} texels, more than are read, {LONGEST_SIDE} along a side and {most} of what is left of \
+                 all images'; make it smaller"
+            ));
+        }
         let mut limits = Limits::default();
-        limits.max_image_width = Some(LONGEST_SIDE);
-        limits.max_image_height = Some(LONGEST_SIDE);
-        limits.max_alloc = Some(MOST_MEMORY);
+        limits.max_alloc = Some(MEMORY_A_TEXEL * texels + (1 << 20));
+        let mut reader = reader();
         reader.limits(limits);
         let decoded = reader.decode().map_err(unreadable)?.into_rgba8();
-        let (width, height) = decoded.dimensions();
         Ok(Self {
             width,
             height,

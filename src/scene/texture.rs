@@ -13,6 +13,9 @@ use super::document::Document;
 use super::image::Pixels;
 use crate::layout::{CLAMP, MIRROR_REPEAT, NEAREST, REPEAT, SECOND_SET, SRGB, TextureLookup, WRAP_U, WRAP_V};
 
+/// Texels of all images at the most, 2 GiB: a small file can name many large images.
+const MOST_TEXELS: u64 = 1 << 29;
+
 /// Source of a texture that names no image.
 const NO_SOURCE: usize = u32::MAX as usize;
 
@@ -101,8 +104,8 @@ impl<'a> TextureReader<'a> {
             Some(place) => *place,
             None => {
                 let label = label("image", index, image.name.as_deref());
-                let place = match Pixels::read(self.document, image, self.folder) {
-                    Ok(pixels) => Some(self.add(&pixels)?),
+                let place = match Pixels::read(self.document, image, self.folder, self.room()) {
+                    Ok(pixels) => Some(self.add(&pixels)),
                     Err(what) => {
                         warnings.push(format!("{label}: {what}; its textures are left out"));
                         None
@@ -164,15 +167,17 @@ impl<'a> TextureReader<'a> {
 }
 
 impl TextureReader<'_> {
+    /// Texels that can still be read.
+    fn room(&self) -> u64 {
+        MOST_TEXELS - self.textures.texels.len() as u64
+    }
+
     /// Adds an image; returns its first texel and its size.
-    fn add(&mut self, pixels: &Pixels) -> Check<[u32; 2]> {
+    fn add(&mut self, pixels: &Pixels) -> [u32; 2] {
         let texels = &mut self.textures.texels;
-        let first = u32::try_from(texels.len()).ok();
-        let first = first
-            .filter(|first| first.checked_add(pixels.rgba.len() as u32).is_some())
-            .ok_or("its images have more than 4,294,967,295 texels; make them smaller")?;
+        let first = texels.len() as u32;
         texels.extend(pixels.rgba.iter().map(|rgba| u32::from_le_bytes(*rgba)));
-        Ok([first, pixels.width | pixels.height << 16])
+        [first, pixels.width | pixels.height << 16]
     }
 }
 

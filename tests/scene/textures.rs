@@ -143,7 +143,10 @@ fn what_is_unlit_shows_its_base_color_and_is_no_light() {
     assert_eq!(floor.textures.emission, floor.textures.base_color);
     let lamps = scene.emissive_triangles();
     let of_floor = |triangle: u32| scene.objects[scene.triangles[triangle as usize].object as usize].material == 0;
-    assert!(!lamps.is_empty() && !lamps.iter().any(|lamp| of_floor(lamp.triangle)), "{lamps:?}");
+    assert!(
+        !lamps.is_empty() && !lamps.iter().any(|lamp| of_floor(lamp.triangle)),
+        "{lamps:?}"
+    );
 }
 
 #[test]
