@@ -26,6 +26,7 @@ layout(local_size_x = 64) in;
 // visible points are found once and have to hold both branches).
 layout(constant_id = 1) const uint SLOTS = 1u;
 layout(constant_id = 2) const bool JITTER = true;
+layout(constant_id = 19) const bool LENS = false;
 
 layout(push_constant) uniform Push {
     uint iteration;
@@ -112,10 +113,11 @@ void main() {
     branch.origin = settings.camera_position.xyz + (parallel ? place : vec3(0.0));
     branch.direction = settings.camera_forward.xyz + (parallel ? vec3(0.0) : place);
     float lens_radius = settings.camera_position.w;
-    if (lens_radius > 0.0) {
+    if (LENS && lens_radius > 0.0) {
         // All rays of a place in the picture meet where it is in focus.
-        float r = lens_radius * sqrt(u.z);
-        float phi = 2.0 * PI * u.w;
+        vec2 on_lens = next4(random).xy;
+        float r = lens_radius * sqrt(on_lens.x);
+        float phi = 2.0 * PI * on_lens.y;
         vec3 off_axis = r * (cos(phi) * normalize(settings.camera_right.xyz) + sin(phi) * normalize(settings.camera_up.xyz));
         branch.origin += off_axis;
         branch.direction = settings.camera_right.w * branch.direction - off_axis;

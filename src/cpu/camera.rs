@@ -154,7 +154,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
     let settings = inputs.settings;
     let [width, _] = settings.resolution;
     let mut random = Random::of_pixel(inputs, PathKind::Camera, pixel[1] * width + pixel[0], iteration);
-    let [jitter_x, jitter_y, lens_u, lens_v] = random.next4();
+    let [jitter_x, jitter_y, ..] = random.next4();
     let [x, y] = match inputs.config.estimator {
         Estimator::Sppm => [jitter_x, jitter_y],
         Estimator::Ppm => [0.5; 2],
@@ -170,6 +170,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
     *(if parallel != 0.0 { &mut origin } else { &mut direction }) += place;
     if lens_radius > 0.0 {
         // All rays of a place in the picture meet where it is in focus.
+        let [lens_u, lens_v, ..] = random.next4();
         let (sin, cos) = (TAU * lens_v).sin_cos();
         let off_axis = f64::from(lens_radius) * lens_u.sqrt() * (cos * right.normalize() + sin * up.normalize());
         origin += off_axis;

@@ -96,7 +96,10 @@ impl Renderer {
             sizes,
             limits,
             settings,
-            features: scene.features,
+            features: SceneFeatures {
+                lens: scene.features.lens || camera.lens.is_some(),
+                ..scene.features
+            },
             iterations: 0,
             emitted: 0,
             counters: Counters::default(),

@@ -41,6 +41,8 @@ pub struct SceneFeatures {
     pub textured: bool,
     /// Surfaces that aren't there everywhere.
     pub alpha: bool,
+    /// A lens before the camera that is rendered.
+    pub lens: bool,
 }
 
 impl SceneFeatures {
@@ -59,6 +61,7 @@ impl SceneFeatures {
         environment: true,
         textured: true,
         alpha: true,
+        lens: true,
     };
 
     /// The features of what is seen, of materials that triangles have, and of the lights.
@@ -91,7 +94,7 @@ impl SceneFeatures {
     }
 
     /// Each feature's constant in the kernels, and its value.
-    pub fn constants(self) -> [(&'static str, bool); 13] {
+    pub fn constants(self) -> [(&'static str, bool); 14] {
         [
             ("MIRRORS", self.mirror),
             ("DIELECTRICS", self.dielectric),
@@ -106,11 +109,12 @@ impl SceneFeatures {
             ("ENVIRONMENT", self.environment),
             ("TEXTURED", self.textured),
             ("ALPHA", self.alpha),
+            ("LENS", self.lens),
         ]
     }
 
     /// Those of these values, in the order of [`SceneFeatures::constants`].
-    pub fn of_constants(values: [bool; 13]) -> Self {
+    pub fn of_constants(values: [bool; 14]) -> Self {
         let [
             mirror,
             dielectric,
@@ -125,6 +129,7 @@ impl SceneFeatures {
             environment,
             textured,
             alpha,
+            lens,
         ] = values;
         Self {
             mirror,
@@ -140,6 +145,7 @@ impl SceneFeatures {
             environment,
             textured,
             alpha,
+            lens,
         }
     }
 
