@@ -41,9 +41,10 @@ Encounter encounter(Hit hit, vec3 incoming, uint medium) {
             bool apart = abs(dot(other.position - met.surface.position, n)) > step_off;
             bool meets_other = !apart && other.object != met.surface.object;
             Material other_material = material_at(other.material);
-            if (meets_other && !is_dielectric(other_material)) {
+            bool is_there = share_there(other) >= 0.5;
+            if (meets_other && !is_dielectric(other_material) && is_there) {
                 met.surface = other;
-            } else if (meets_other && dot(other.geometric_normal, n) < 0.0) {
+            } else if (meets_other && is_dielectric(other_material) && dot(other.geometric_normal, n) < 0.0) {
                 met.outside = other_material.ior;
                 other_tint = other_material.base_color;
                 if (front) {

@@ -102,6 +102,8 @@ vec4 texture_value(uint index, Place place) {
     TextureLookup lookup = lookup_at(index);
     vec3 set = vec3((lookup.flags & SECOND_SET) != 0u ? place.sets.zw : place.sets.xy, 1.0);
     vec2 at = vec2(dot(lookup.row_u, set), dot(lookup.row_v, set)) * vec2(lookup.size & 0xffffu, lookup.size >> 16u);
+    // Past that, floats have no texels apart; NaN fails the comparison.
+    at = vec2(abs(at.x) < 8388608.0 ? at.x : 0.0, abs(at.y) < 8388608.0 ? at.y : 0.0);
     bool nearest = (lookup.flags & NEAREST) != 0u;
     at -= nearest ? vec2(0.0) : vec2(0.5);
     vec2 low = floor(at);

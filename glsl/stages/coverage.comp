@@ -14,6 +14,7 @@ layout(local_size_x = 64) in;
 #include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"
+#include "texture.glsl"
 #include "object_grid.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
@@ -76,8 +77,8 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
         if (surface.object == object) {
             return true; // the surface bends up
         }
-        // Light passes glass.
-        if (!is_dielectric(material_at(surface.material))) {
+        // Light passes glass, and what isn't there everywhere.
+        if (!is_dielectric(material_at(surface.material)) && (surface.flags & SEE_THROUGH) == 0u) {
             inside = !inside;
             entered = side_of(surface, along);
         }
@@ -96,7 +97,11 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
             below = trace(origin + along, -radius * n, 1.0, below.triangle, false);
         }
     }
-    return below.triangle != MISS && shading_triangle(below.triangle).object == object;
+    if (below.triangle == MISS) {
+        return false;
+    }
+    Surface there = surface_at(below.triangle, vec2(below.u, below.v));
+    return there.object == object && share_there(there) > 0.0;
 }
 
 void main() {

@@ -145,7 +145,9 @@ void main() {
                 if (stored < settings.lane_capacity) {
                     Photon photon;
                     photon.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
-                    photon.flux_direction = vec4(landing, uintBitsToFloat(encode_direction(incoming)));
+                    // What is there in part is seen in part as well as met in part.
+                    photon.flux_direction = vec4(landing / share_there(surface),
+                                                 uintBitsToFloat(encode_direction(incoming)));
                     lane_photons[stored * settings.photon_lanes + lane] = photon;
                 }
                 stored += 1u;

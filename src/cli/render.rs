@@ -64,6 +64,13 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let config = config(arguments, gather, camera);
     let packed = while_showing(BUILDING, quiet, || PackedScene::new(&scene))
         .map_err(|what| crate::error::Error::scene(path, what))?;
+    let features = &packed.features;
+    if config.estimator == Estimator::Ppm && (features.dispersion || features.alpha || features.partly_clear) {
+        say!(
+            "warning: --estimator ppm finds visible points once: where a wavelength, alpha or a part of the light is chosen by \
+             chance, each pixel keeps its first choice; use --estimator sppm"
+        );
+    }
     let mut backend = open(backend_choice, arguments.device.as_deref(), &packed, camera, &config)?;
     if arguments.radius.is_none() {
         say!(

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::Inputs;
 use super::intersect::{Hit, Ray, nearest_hit};
 use super::surface::{DIELECTRIC, Facing, GLOSSY, ROUNDINGS, Surface, surface_at};
-use super::texture::apply_textures;
+use super::texture::{apply_textures, share_there};
 use super::vector::rgb;
 use crate::layout::{Material, TOUCHED};
 
@@ -64,7 +64,14 @@ impl Encounter {
         };
         let other = nearest_hit(inputs, through, 1.0, Some(hit.triangle)).map(at);
         match other.filter(touches) {
-            Some(other) if other.material.surface != DIELECTRIC => alone(textured(other)),
+            Some(other) if other.material.surface != DIELECTRIC => {
+                // What isn't there everywhere is all there or not at all here.
+                if share_there(inputs.scene, &other) >= 0.5 {
+                    alone(textured(other))
+                } else {
+                    alone(surface)
+                }
+            }
             Some(other) if other.geometric_normal.dot(n) < 0.0 => {
                 let met = alone(surface);
                 let other_side = Some(other.material_index);

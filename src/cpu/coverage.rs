@@ -9,9 +9,10 @@ use super::intersect::{Ray, nearest_hit};
 use super::random::{PathKind, Random};
 use super::sampling::{basis, decode_direction};
 use super::surface::{DIELECTRIC, Surface, offset_origin, reach_of, surface_at};
+use super::texture::share_there;
 use super::vector::{word, xyz};
 use super::{FAR, Inputs};
-use crate::layout::{Coverage, NO_OBJECT, Statistics, VisiblePoint};
+use crate::layout::{Coverage, NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint};
 
 /// What an iteration counts for, whatever its points.
 const WHOLE: u32 = 16;
@@ -86,8 +87,8 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
         if surface.object == object {
             return true; // the surface bends up
         }
-        // Light passes glass.
-        if surface.material.surface != DIELECTRIC {
+        // Light passes glass, and what isn't there everywhere.
+        if surface.material.surface != DIELECTRIC && surface.flags & SEE_THROUGH == 0 {
             let side = Side::of(&surface, along);
             entered = if entered.is_none() { Some(side) } else { None };
         }
@@ -115,10 +116,14 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
     };
     let mut below = nearest_hit(inputs, down, 1.0, None);
     if let Some(hit) = below
+        && inputs.scene.features.contact
         && object_of(hit.triangle) != object
         && surface_of(hit.triangle) == DIELECTRIC
     {
         below = nearest_hit(inputs, down, 1.0, Some(hit.triangle));
     }
-    below.is_some_and(|hit| object_of(hit.triangle) == object)
+    below.is_some_and(|hit| {
+        let there = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+        there.object == object && share_there(inputs.scene, &there) > 0.0
+    })
 }

@@ -12,7 +12,7 @@ use super::light::range_window;
 use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction};
 use super::surface::{Boundary, GLOSSY, MATTE, MIRROR};
-use super::texture::nearest_visible;
+use super::texture::{nearest_visible, share_there};
 use super::vector::{rgb, with_word};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
@@ -123,7 +123,11 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             if !(samples_lights && path.seen_directly) {
                 photons.push(Photon {
                     position_object: with_word(surface.position, surface.object),
-                    flux_direction: with_word(landing, encode_direction(incoming)),
+                    // What is there in part is seen in part as well as met in part.
+                    flux_direction: with_word(
+                        landing / share_there(inputs.scene, &surface),
+                        encode_direction(incoming),
+                    ),
                 });
             }
         }

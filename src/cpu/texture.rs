@@ -7,7 +7,7 @@ use super::Inputs;
 use super::intersect::{Hit, Ray, nearest_hit};
 use super::random::Random;
 use super::sampling::decode_direction;
-use super::surface::Surface;
+use super::surface::{Surface, surface_at};
 use super::vector::rgb;
 use crate::layout::{BLEND, MASK, Material, NO_TEXTURE, SEE_THROUGH, TEXTURED};
 use crate::scene::PackedScene;
@@ -137,20 +137,20 @@ pub(super) fn nearest_visible(
     if !inputs.scene.features.alpha {
         return Some(hit);
     }
-    let (mut passed, mut number) = (0.0, 0);
-    loop {
-        let flags = inputs.scene.shading_triangles[hit.triangle as usize].flags;
-        if flags & SEE_THROUGH == 0 || random.of_passage(number) < alpha_at(inputs.scene, hit.triangle, [hit.u, hit.v])
-        {
-            hit.t += passed;
-            return Some(hit);
+    let mut passed = 0.0;
+    for number in 0.. {
+        let met = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+        if met.flags & SEE_THROUGH == 0 || random.of_passage(number) < share_there(inputs.scene, &met) {
+            break;
         }
-        passed += hit.t;
-        number += 1;
+        // A step behind what it has passed: faces in one place are passed as one.
         let behind = Ray {
-            origin: ray.origin + passed * ray.direction,
+            origin: met.origin_towards(ray.direction),
             ..ray
         };
+        passed = (behind.origin - ray.origin).dot(ray.direction) / ray.direction.length_squared();
         hit = nearest_hit(inputs, behind, t_max - passed, Some(hit.triangle))?;
     }
+    hit.t += passed;
+    Some(hit)
 }

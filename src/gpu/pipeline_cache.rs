@@ -39,10 +39,12 @@ impl PipelineCache {
         });
         let known = file.as_deref().and_then(read).unwrap_or_default();
         let known = if is_of(&known, &properties) { known } else { Vec::new() };
-        let create = vk::PipelineCacheCreateInfo::default().initial_data(&known);
-        // SAFETY: a plain creation call; `free` destroys what it makes.
-        let handle = unsafe { context.device.create_pipeline_cache(&create, None) };
-        let handle = handle.or_vulkan("vkCreatePipelineCache")?;
+        let make = |known: &[u8]| {
+            let create = vk::PipelineCacheCreateInfo::default().initial_data(known);
+            // SAFETY: a plain creation call; `free` destroys what it makes.
+            unsafe { context.device.create_pipeline_cache(&create, None) }
+        };
+        let handle = make(&known).or_else(|_| make(&[])).or_vulkan("vkCreatePipelineCache")?;
         context.name(handle, "pipelines");
         Ok(Self { handle, file, known })
     }
@@ -69,8 +71,11 @@ fn folder() -> Option<PathBuf> {
             .map(PathBuf::from)
     };
     let cache = variable("XDG_CACHE_HOME").or_else(|| variable("LOCALAPPDATA"));
-    let cache = cache.or_else(|| variable("HOME").map(|home| home.join(".cache")))?;
-    Some(cache.join("ppm-vk"))
+    let cache = cache.or_else(|| variable("HOME").map(|home| home.join(".cache")));
+    // The XDG base directory specification: a relative one is to be ignored.
+    cache
+        .filter(|cache| cache.is_absolute())
+        .map(|cache| cache.join("ppm-vk"))
 }
 
 /// FNV-1a: tells a file that was cut or changed.

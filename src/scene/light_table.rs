@@ -149,7 +149,9 @@ fn disc_across(scene: &Scene, direction: DVec3) -> (DVec3, f64) {
         before = before.max(-along);
         radius2 = radius2.max((position - along * direction).length_squared());
     }
-    (-direction * before * MARGIN, PI * radius2 * MARGIN)
+    // A flat scene across the light would have the disc in its plane.
+    let apart = 1e-3 * radius2.sqrt();
+    (-direction * (before + apart), PI * radius2 * MARGIN)
 }
 
 /// Radius of a sphere around the origin that holds the scene.

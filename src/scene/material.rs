@@ -17,6 +17,9 @@ const DEFAULT_IOR: f32 = 1.5;
 /// Largest index of refraction: far above any material's, and its square is far from the end of f32.
 const MAX_IOR: f32 = 100.0;
 
+/// Largest scale of a normal texture: what leans further lies in the surface.
+const STEEPEST: f32 = 1e4;
+
 /// Converts every material of the file, and the default material after them.
 ///
 /// Only those that `used` marks (one flag for each, the default's last) give rise to warnings.
@@ -252,6 +255,12 @@ impl Reader<'_> {
             specular.and_then(|it| it.specular_texture.as_ref()).map(linear),
             specular.and_then(|it| it.specular_color_texture.as_ref()).map(color),
         ];
+        let scale = json.normal_texture.as_ref().map_or(1.0, |texture| texture.scale);
+        if scale.is_nan() || scale.abs() > STEEPEST {
+            return Err(format!(
+                "its normalTexture's scale is {scale}, but its size must be {STEEPEST} at the most; correct it in the file"
+            ));
+        }
         let mut found = [None; 7];
         for (found, wanted) in found.iter_mut().zip(&uses) {
             if let Some(wanted) = wanted {
@@ -270,7 +279,7 @@ impl Reader<'_> {
         Ok(MaterialTextures {
             base_color,
             metallic_roughness,
-            normal: normal.map(|index| (index, json.normal_texture.as_ref().map_or(1.0, |texture| texture.scale))),
+            normal: normal.map(|index| (index, scale)),
             emission,
             transmission,
             specular,

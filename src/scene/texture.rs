@@ -215,6 +215,8 @@ impl TextureLookup {
             place(self.row_u) * f64::from(size[0]),
             place(self.row_v) * f64::from(size[1]),
         ];
+        // Past that, floats have no texels apart; NaN fails the comparison.
+        let [u, v] = [u, v].map(|at: f64| if at.abs() < 8_388_608.0 { at } else { 0.0 });
         let texel = |x: i64, y: i64| {
             let (x, y) = (
                 wrap(x, size[0], self.flags >> WRAP_U),

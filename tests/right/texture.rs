@@ -100,6 +100,51 @@ fn what_is_there_in_part_covers_its_part() {
     }
 }
 
+/// A white plate reflects what it doesn't let pass, by rays and by photons: it vanishes.
+#[test]
+fn a_white_plate_that_is_there_in_part_vanishes() {
+    let plate = plate(|scene| {
+        let alphas = [64u8, 128, 192, 255];
+        let texture = scene.texture(
+            &png(2, 2, |x, y| [255, 255, 255, alphas[(2 * y + x) as usize]]),
+            Filter::Nearest,
+        );
+        let mut material = with_texture(matte("plate", [1.0; 3]), COLOR, texture);
+        material["alphaMode"] = json!("BLEND");
+        scene.material(material)
+    });
+    for (direct, photons) in [(Direct::Light, 100), (Direct::Photons, 50_000)] {
+        let measured = measure(&plate, config(direct, photons), 32, |image| {
+            quarters().iter().map(|region| region.of(image, 0)).collect()
+        });
+        for measured in measured {
+            measured.assert_is(1.0, &format!("direct light by {direct:?}"));
+        }
+    }
+}
+
+/// Two faces in one place, neither of which is there, stop nothing: not even the render.
+#[test]
+fn faces_in_one_place_that_are_not_there_let_all_light_pass() {
+    let mut scene = Document::new("leaves");
+    let mut nothing = matte("nothing", [0.0; 3]);
+    nothing["alphaMode"] = json!("MASK");
+    nothing["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.0, 0.0, 0.0, 0.0]);
+    let nothing = scene.material(nothing);
+    let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]].map(|[x, y]| dvec3(x, y, 0.3 * x + 0.1 * y));
+    let back = [corners[0], corners[3], corners[2], corners[1]];
+    for face in [corners, back, corners] {
+        scene.object("leaf", &Mesh::quad(face), nothing);
+    }
+    scene.camera([0.0, 1.0], [0.0, 0.0], 40.0);
+    let leaves = subject_under(scene, Some(Environment::constant(Vec3::ONE)));
+    let image = leaves.render(2, config(Direct::Photons, 1000));
+    assert!(
+        image.pixels().iter().all(|pixel| *pixel == [1.0; 3]),
+        "something is seen"
+    );
+}
+
 /// A small lamp high above a floor: radiance · area · cos θ² / distance² / π · albedo right below it, where what stands between
 /// takes its part of it, and a leaning normal the cosine of its angle.
 fn lit_floor(change_floor: impl FnOnce(&mut Document) -> usize, sheet: Option<f64>) -> (Subject, f64) {
