@@ -12,68 +12,76 @@ pub(super) const DIELECTRIC: u32 = 2;
 /// [`Material::surface`] of what reflects as microfacets do, over a Lambertian base.
 pub(super) const GLOSSY: u32 = 3;
 
-/// What a scene has. Each is a specialisation constant of the stages that trace rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct SceneFeatures {
+/// Declares the features, each with its constant in the kernels.
+macro_rules! features {
+    ($($(#[$doc:meta])* $feature:ident: $constant:literal,)*) => {
+        /// What a scene has. Each is a specialisation constant of the stages that trace rays.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+        pub struct SceneFeatures {
+            $($(#[$doc])* pub $feature: bool,)*
+        }
+
+        const COUNT: usize = [$($constant),*].len();
+
+        impl SceneFeatures {
+            /// Everything that a scene can have.
+            pub const ALL: Self = Self { $($feature: true,)* };
+
+            /// Each feature's constant in the kernels, and its value.
+            pub fn constants(self) -> [(&'static str, bool); COUNT] {
+                [$(($constant, self.$feature),)*]
+            }
+
+            /// Those of these values, in the order of [`SceneFeatures::constants`].
+            pub fn of_constants(values: [bool; COUNT]) -> Self {
+                let [$($feature,)*] = values;
+                Self { $($feature,)* }
+            }
+        }
+    };
+}
+
+features! {
     /// Mirrors.
-    pub mirror: bool,
+    mirror: "MIRRORS",
     /// Boundaries of dielectrics.
-    pub dielectric: bool,
+    dielectric: "DIELECTRICS",
     /// Microfacets over a base.
-    pub glossy: bool,
+    glossy: "GLOSSY",
     /// Microfacets of dielectrics.
-    pub rough_glass: bool,
+    rough_glass: "ROUGH_GLASS",
     /// Dielectrics without an inside.
-    pub thin_walls: bool,
+    thin_walls: "THIN_WALLS",
     /// Dielectrics that pass a part of the light only.
-    pub partly_clear: bool,
+    partly_clear: "PARTLY_CLEAR",
     /// Dielectrics that absorb light inside.
-    pub absorption: bool,
+    absorption: "ABSORPTION",
     /// Dielectrics that bend each wavelength its own way.
-    pub dispersion: bool,
+    dispersion: "DISPERSION",
     /// Boundaries of dielectrics that lie on faces of other objects.
-    pub contact: bool,
+    contact: "CONTACT",
     /// Lights that are points or directions.
-    pub punctual: bool,
+    punctual: "PUNCTUAL_LIGHTS",
     /// An environment.
-    pub environment: bool,
+    environment: "ENVIRONMENT",
     /// Textures, or colours of corners.
-    pub textured: bool,
+    textured: "TEXTURED",
     /// Surfaces that aren't there everywhere.
-    pub alpha: bool,
+    alpha: "ALPHA",
     /// A lens before the camera that is rendered.
-    pub lens: bool,
+    lens: "LENS",
 }
 
 impl SceneFeatures {
-    /// Everything that a scene can have.
-    pub const ALL: Self = Self {
-        mirror: true,
-        dielectric: true,
-        glossy: true,
-        rough_glass: true,
-        thin_walls: true,
-        partly_clear: true,
-        absorption: true,
-        dispersion: true,
-        contact: true,
-        punctual: true,
-        environment: true,
-        textured: true,
-        alpha: true,
-        lens: true,
-    };
-
     /// The features of what is seen, of materials that triangles have, and of the lights.
     pub(super) fn of(triangles: &[ShadingTriangle], materials: &[Material], lights: &[Light]) -> Self {
         let mut features = Self::default();
         for triangle in triangles {
             let material = &materials[triangle.material as usize];
             let glass = material.surface == DIELECTRIC;
-            // Textures make less of a factor.
-            let varies = |texture: u32| texture != NO_TEXTURE;
-            let clear = material.transmission == 1.0 && material.metallic == 0.0;
-            let mixed = glass && (!clear || varies(material.transmission_texture));
+            // A texture makes less of the factor.
+            let clear = material.transmission == 1.0 && material.transmission_texture == NO_TEXTURE;
+            let mixed = glass && !(clear && material.metallic == 0.0);
             features.mirror |= material.surface == MIRROR;
             features.dielectric |= glass;
             features.glossy |= material.surface == GLOSSY || mixed;
@@ -91,62 +99,6 @@ impl SceneFeatures {
             features.environment |= light.kind == ENVIRONMENT_LIGHT;
         }
         features
-    }
-
-    /// Each feature's constant in the kernels, and its value.
-    pub fn constants(self) -> [(&'static str, bool); 14] {
-        [
-            ("MIRRORS", self.mirror),
-            ("DIELECTRICS", self.dielectric),
-            ("GLOSSY", self.glossy),
-            ("ROUGH_GLASS", self.rough_glass),
-            ("THIN_WALLS", self.thin_walls),
-            ("PARTLY_CLEAR", self.partly_clear),
-            ("ABSORPTION", self.absorption),
-            ("DISPERSION", self.dispersion),
-            ("CONTACT", self.contact),
-            ("PUNCTUAL_LIGHTS", self.punctual),
-            ("ENVIRONMENT", self.environment),
-            ("TEXTURED", self.textured),
-            ("ALPHA", self.alpha),
-            ("LENS", self.lens),
-        ]
-    }
-
-    /// Those of these values, in the order of [`SceneFeatures::constants`].
-    pub fn of_constants(values: [bool; 14]) -> Self {
-        let [
-            mirror,
-            dielectric,
-            glossy,
-            rough_glass,
-            thin_walls,
-            partly_clear,
-            absorption,
-            dispersion,
-            contact,
-            punctual,
-            environment,
-            textured,
-            alpha,
-            lens,
-        ] = values;
-        Self {
-            mirror,
-            dielectric,
-            glossy,
-            rough_glass,
-            thin_walls,
-            partly_clear,
-            absorption,
-            dispersion,
-            contact,
-            punctual,
-            environment,
-            textured,
-            alpha,
-            lens,
-        }
     }
 
     /// A constant's name for people.
