@@ -9,6 +9,7 @@ use document::{
 };
 use glam::{DVec3, dvec3};
 use mesh::Mesh;
+use serde_json::Value;
 use serde_json::json;
 use std::f64::consts::FRAC_PI_2;
 
@@ -71,15 +72,9 @@ fn cornell_spheres() -> Document {
     scene
 }
 
-/// The same room with spheres of satin and of polished metal and of plastic, rough and smooth.
-fn glossy() -> Document {
-    let mut scene = cornell_room("glossy");
-    let materials = [
-        metallic_roughness("satin", [0.95, 0.7, 0.4], 1.0, 0.5),
-        metallic_roughness("polished", [0.9, 0.9, 0.92], 1.0, 0.2),
-        metallic_roughness("plastic", [0.15, 0.3, 0.7], 0.0, 0.35),
-        metallic_roughness("lacquer", [0.6, 0.08, 0.06], 0.0, 0.0),
-    ];
+/// The same room with a sphere of each of these materials.
+fn four_spheres(name: &'static str, materials: [Value; 4]) -> Document {
+    let mut scene = cornell_room(name);
     let sphere = Mesh::icosphere(0.3, 4);
     let places = [[-0.6, -0.4], [0.1, -0.55], [-0.25, 0.35], [0.5, 0.25]];
     for (material, [x, z]) in materials.into_iter().zip(places) {
@@ -90,23 +85,30 @@ fn glossy() -> Document {
     scene
 }
 
+/// The same room with spheres of satin and of polished metal and of plastic, rough and smooth.
+fn glossy() -> Document {
+    four_spheres(
+        "glossy",
+        [
+            metallic_roughness("satin", [0.95, 0.7, 0.4], 1.0, 0.5),
+            metallic_roughness("polished", [0.9, 0.9, 0.92], 1.0, 0.2),
+            metallic_roughness("plastic", [0.15, 0.3, 0.7], 0.0, 0.35),
+            metallic_roughness("lacquer", [0.6, 0.08, 0.06], 0.0, 0.0),
+        ],
+    )
+}
+
 /// The same room with spheres of tinted, frosted, thin and half clear glass.
 fn glasses() -> Document {
-    let mut scene = cornell_room("glasses");
-    let materials = [
-        glass("tinted", 0.0, 1.0, Some(([0.1, 0.6, 0.3], 0.4))),
-        glass("frosted", 0.35, 1.0, Some(([1.0; 3], 1.0))),
-        glass("thin", 0.0, 1.0, None),
-        glass("half-clear", 0.2, 0.6, Some(([0.9, 0.7, 0.2], 0.5))),
-    ];
-    let sphere = Mesh::icosphere(0.3, 4);
-    let places = [[-0.6, -0.4], [0.1, -0.55], [-0.25, 0.35], [0.5, 0.25]];
-    for (material, [x, z]) in materials.into_iter().zip(places) {
-        let material = scene.material(material);
-        scene.object("sphere", &sphere, material).at([x, 0.3005, z]);
-    }
-    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
-    scene
+    four_spheres(
+        "glasses",
+        [
+            glass("tinted", 0.0, 1.0, Some(([0.1, 0.6, 0.3], 0.4))),
+            glass("frosted", 0.35, 1.0, Some(([1.0; 3], 1.0))),
+            glass("thin", 0.0, 1.0, None),
+            glass("half-clear", 0.2, 0.6, Some(([0.9, 0.7, 0.2], 0.5))),
+        ],
+    )
 }
 
 /// A golden ring on a table, lit from the side: the cardioid caustic.
