@@ -9,7 +9,7 @@ use super::random::Random;
 use super::sampling::decode_direction;
 use super::surface::{Surface, surface_at};
 use super::vector::rgb;
-use crate::layout::{BLEND, MASK, Material, NO_TEXTURE, SEE_THROUGH, TEXTURED};
+use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED};
 use crate::scene::PackedScene;
 
 /// What a place of a triangle has for textures.
@@ -45,7 +45,7 @@ impl Place {
 /// The value of a texture, or `None` where there is none.
 fn value(scene: &PackedScene, texture: u32, place: &Place) -> Option<DVec4> {
     let lookup = (texture != NO_TEXTURE).then(|| &scene.textures[texture as usize])?;
-    Some(lookup.value(scene.texels.as_flattened(), place.sets))
+    Some(lookup.value(&scene.texels, place.sets))
 }
 
 /// Gives a surface the material of its place. A texture of normals turns its shading normal.
@@ -101,13 +101,15 @@ fn leaning_normal(surface: &Surface, place: &Place, value: DVec3, scale: f64) ->
     }
 }
 
-/// The part of a place's surface that is there.
-fn alpha_at(scene: &PackedScene, triangle: u32, uv: [f64; 2]) -> f64 {
-    let shading = &scene.shading_triangles[triangle as usize];
-    let material: &Material = &scene.materials[shading.material as usize];
+/// The part of a surface that is there, at its place.
+pub(super) fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
+    if surface.flags & SEE_THROUGH == 0 {
+        return 1.0;
+    }
+    let material = &surface.material;
     let mut alpha = f64::from(material.alpha);
-    if shading.flags & TEXTURED != 0 {
-        let place = Place::of(scene, triangle, uv);
+    if surface.flags & TEXTURED != 0 {
+        let place = Place::of(scene, surface.triangle, surface.uv);
         alpha *= place.color.w * value(scene, material.color_texture, &place).map_or(1.0, |value| value.w);
     }
     match material.alpha_mode {
@@ -115,14 +117,6 @@ fn alpha_at(scene: &PackedScene, triangle: u32, uv: [f64; 2]) -> f64 {
         BLEND => alpha.clamp(0.0, 1.0),
         _ => 1.0,
     }
-}
-
-/// Of a surface's point that was chosen without regard for what is there.
-pub(super) fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
-    if surface.flags & SEE_THROUGH == 0 {
-        return 1.0;
-    }
-    alpha_at(scene, surface.triangle, surface.uv)
 }
 
 /// As [`nearest_hit`], by chance through what is there in part: a pure function of the ray's place in its path.
@@ -140,7 +134,7 @@ pub(super) fn nearest_visible(
     let mut passed = 0.0;
     for number in 0.. {
         let met = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
-        if met.flags & SEE_THROUGH == 0 || random.of_passage(number) < share_there(inputs.scene, &met) {
+        if random.of_passage(number) < share_there(inputs.scene, &met) {
             break;
         }
         // A step behind what it has passed: faces in one place are passed as one.

@@ -17,7 +17,7 @@ use super::{glb, meshopt};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 11] = [
+pub(super) const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_lights_punctual",
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",

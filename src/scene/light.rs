@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Scene, Triangle};
+use super::{Object, Scene, Triangle};
 
 /// A triangle that emits light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,17 +42,26 @@ impl Scene {
         (sum / f64::from(ALONG * ALONG)).max(LEAST)
     }
 
-    /// The triangles that emit light, in the order of [`Scene::triangles`].
-    ///
-    /// Photons are emitted, and lights sampled, nearly in proportion to their powers.
-    pub fn emissive_triangles(&self) -> Vec<EmissiveTriangle> {
-        let emitting = self.objects.iter().filter_map(|object| {
+    /// Objects that emit light, with the exitance of their sides together, mean of RGB, as if there were no textures.
+    fn emitting_objects(&self) -> impl Iterator<Item = (&Object, f64)> {
+        self.objects.iter().filter_map(|object| {
             let material = &self.materials[object.material as usize];
             let radiance = material.emission.as_dvec3().element_sum() / 3.0;
             let sides = if material.double_sided { 2.0 } else { 1.0 };
             (radiance > 0.0 && !material.unlit).then_some((object, radiance * PI * sides))
-        });
-        emitting
+        })
+    }
+
+    /// Whether anything in it emits light.
+    pub(super) fn has_emissive_triangles(&self) -> bool {
+        self.emitting_objects().next().is_some()
+    }
+
+    /// The triangles that emit light, in the order of [`Scene::triangles`].
+    ///
+    /// Photons are emitted, and lights sampled, nearly in proportion to their powers.
+    pub fn emissive_triangles(&self) -> Vec<EmissiveTriangle> {
+        self.emitting_objects()
             .flat_map(|(object, exitance)| {
                 object.triangles.clone().map(move |triangle| {
                     let area = self.triangle_area(triangle);

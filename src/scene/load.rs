@@ -98,7 +98,7 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         warnings.push("it has no camera; one that is framed on its bounds is used".into());
         scene.cameras.push(camera::framed_on(scene.bounds()));
     }
-    if scene.environment.is_none() && scene.lights.is_empty() && scene.emissive_triangles().is_empty() {
+    if scene.environment.is_none() && scene.lights.is_empty() && !scene.has_emissive_triangles() {
         warnings.push(
             "it has no light; it is rendered in an environment of radiance 1 (--environment sets another one)".into(),
         );

@@ -27,8 +27,8 @@ pub struct PackedScene {
     pub corners: Vec<Corner>,
     /// Textures.
     pub textures: Vec<TextureLookup>,
-    /// Texels of their images, RGBA bytes, four by four.
-    pub texels: Vec<[u32; 4]>,
+    /// Texels of their images, RGBA bytes; whole fours.
+    pub texels: Vec<u32>,
     /// What the kernels need to know.
     pub features: SceneFeatures,
     /// Lights.
@@ -80,6 +80,8 @@ impl PackedScene {
             triangle.flags |= if touched { TOUCHED } else { 0 };
         }
         let features = SceneFeatures::of(&shading_triangles, &materials, &lights);
+        let mut texels = scene.textures.texels.clone();
+        texels.resize(texels.len().next_multiple_of(4), 0);
         let (object_grids, object_cells) = object_grids(scene);
         Ok(Self {
             power,
@@ -89,7 +91,7 @@ impl PackedScene {
                 Vec::new()
             },
             textures: scene.textures.lookups.clone(),
-            texels: texels(&scene.textures.texels),
+            texels,
             features,
             object_grids,
             object_cells,
@@ -225,21 +227,6 @@ fn texture_corners(scene: &Scene, order: &[u32]) -> Vec<Corner> {
         }
     };
     vertices.map(corner).collect()
-}
-
-fn texels(texels: &[u32]) -> Vec<[u32; 4]> {
-    let (whole, rest) = texels.as_chunks::<4>();
-    let mut last = [0; 4];
-    last[..rest.len()].copy_from_slice(rest);
-    [
-        whole,
-        if rest.is_empty() {
-            &[]
-        } else {
-            std::slice::from_ref(&last)
-        },
-    ]
-    .concat()
 }
 
 /// About the chance that a direction of the BSDF meets a light: the part of the scene's area that emits, or of all directions
