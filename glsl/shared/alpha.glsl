@@ -16,15 +16,9 @@ Hit trace_visible(vec3 origin, vec3 direction, float t_max, uint ignored, bool a
         goes_on = ALPHA && hit.triangle != MISS && !loops_cut;
         if (goes_on) {
             Surface met = surface_at(hit.triangle, vec2(hit.u, hit.v));
-            goes_on = (met.flags & SEE_THROUGH) != 0u;
+            goes_on = of_passage(random, number) >= share_there(met);
             if (goes_on) {
-                uvec4 bits = pcg4d(uvec4(random.path ^ 0x616c7068u, random.iteration, random.seed,
-                                         random.dimension + (number << 16u)));
-                goes_on = float(bits.x >> 8u) * (1.0 / 16777216.0) >= share_there(met);
-            }
-            if (goes_on) {
-                vec3 n = met.geometric_normal;
-                from = offset_origin(met.position, dot(direction, n) >= 0.0 ? n : -n, met.reach);
+                from = origin_towards(met, direction);
                 passed = dot(from - origin, direction) / dot(direction, direction);
                 number += 1u;
                 ignored = hit.triangle;

@@ -116,12 +116,6 @@ Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float ou
     return boundary;
 }
 
-// A ray that leaves the surface starts on the side that it flies to.
-vec3 origin_towards(Surface surface, vec3 direction) {
-    vec3 n = surface.geometric_normal;
-    return offset_origin(surface.position, dot(direction, n) >= 0.0 ? n : -n, surface.reach);
-}
-
 float largest(vec3 v) {
     return max(v.x, max(v.y, v.z));
 }

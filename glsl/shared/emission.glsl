@@ -8,11 +8,6 @@ struct Emission {
     float inverse_range; // of a punctual light
 };
 
-vec2 disc_point(vec2 u) {
-    float phi = 2.0 * PI * u.y;
-    return sqrt(u.x) * vec2(cos(phi), sin(phi));
-}
-
 // From a disc across the direction of flight that covers the scene.
 vec3 origin_afar(vec3 centre, vec3 direction, float area, vec2 u) {
     return centre + basis(direction) * vec3(sqrt(area / PI) * disc_point(u), 0.0);

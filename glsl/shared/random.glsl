@@ -77,6 +77,12 @@ uint congruential(inout uint state) {
     return state;
 }
 
+// Decides whether a ray passes the surface of this number that isn't there everywhere.
+float of_passage(Random random, uint number) {
+    return unit_floats(pcg4d(uvec4(random.path ^ 0x616c7068u, random.iteration, random.seed,
+                                   random.dimension + (number << 16u)))).x;
+}
+
 // The next four numbers, uniform in [0, 1).
 vec4 next4(inout Random random) {
     uvec4 bits;

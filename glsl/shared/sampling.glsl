@@ -8,12 +8,15 @@ mat3 basis(vec3 n) {
     return mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n);
 }
 
+// A point uniform on the unit disc.
+vec2 disc_point(vec2 u) {
+    float phi = 2.0 * PI * u.y;
+    return sqrt(u.x) * vec2(cos(phi), sin(phi));
+}
+
 // A direction around the unit vector n with density cos θ / π (Malley's method).
 vec3 cosine_direction(vec3 n, vec2 u) {
-    float r = sqrt(u.x);
-    float phi = 2.0 * PI * u.y;
-    vec3 local = vec3(r * cos(phi), r * sin(phi), sqrt(max(0.0, 1.0 - u.x)));
-    return normalize(basis(n) * local);
+    return normalize(basis(n) * vec3(disc_point(u), sqrt(max(0.0, 1.0 - u.x))));
 }
 
 // Barycentric coordinates (u, v) of a point uniform on a triangle.

@@ -217,3 +217,9 @@ const float ROUNDINGS = 16.0 / 16777216.0;
 vec3 offset_origin(vec3 p, vec3 n, vec3 reach) {
     return p + ROUNDINGS * dot(abs(n), reach) * n;
 }
+
+// A ray that leaves the surface starts on the side that it flies to.
+vec3 origin_towards(Surface surface, vec3 direction) {
+    vec3 n = surface.geometric_normal;
+    return offset_origin(surface.position, dot(direction, n) >= 0.0 ? n : -n, surface.reach);
+}

@@ -174,28 +174,22 @@ Material material_of(inout Surface surface) {
     return material;
 }
 
-// The part of a place's surface that is there.
-float alpha_at(uint triangle, uint material, uint flags, vec2 uv) {
-    uvec4 mode = TEXEL_BITS(Materials, MATERIAL_TEXELS * material + 7u);
+// The part of a surface that is there, at its place.
+float share_there(Surface surface) {
+    bool see_through = ALPHA && (surface.flags & SEE_THROUGH) != 0u;
+    if (!see_through) {
+        return 1.0;
+    }
+    uvec4 mode = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 7u);
     float alpha = uintBitsToFloat(mode.z);
-    bool textured = TEXTURED && (flags & TEXTURED_TRIANGLE) != 0u;
+    bool textured = TEXTURED && (surface.flags & TEXTURED_TRIANGLE) != 0u;
     if (textured) {
-        Place place = place_at(triangle, uv);
-        uint color = TEXEL_BITS(Materials, MATERIAL_TEXELS * material + 5u).x;
+        Place place = place_at(surface.triangle, surface.uv);
+        uint color = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 5u).x;
         alpha *= place.color.a;
         if (color != NO_TEXTURE) {
             alpha *= texture_value(color, place).a;
         }
     }
     return mode.x == MASK ? (alpha < uintBitsToFloat(mode.y) ? 0.0 : 1.0) : clamp(alpha, 0.0, 1.0);
-}
-
-// Of a surface's point that was chosen without regard for what is there.
-float share_there(Surface surface) {
-    bool see_through = ALPHA && (surface.flags & SEE_THROUGH) != 0u;
-    float share = 1.0;
-    if (see_through) {
-        share = alpha_at(surface.triangle, surface.material, surface.flags, surface.uv);
-    }
-    return share;
 }

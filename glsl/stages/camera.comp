@@ -115,10 +115,8 @@ void main() {
     float lens_radius = settings.camera_position.w;
     if (LENS && lens_radius > 0.0) {
         // All rays of a place in the picture meet where it is in focus.
-        vec2 on_lens = next4(random).xy;
-        float r = lens_radius * sqrt(on_lens.x);
-        float phi = 2.0 * PI * on_lens.y;
-        vec3 off_axis = r * (cos(phi) * normalize(settings.camera_right.xyz) + sin(phi) * normalize(settings.camera_up.xyz));
+        vec2 on_lens = lens_radius * disc_point(next4(random).xy);
+        vec3 off_axis = on_lens.x * normalize(settings.camera_right.xyz) + on_lens.y * normalize(settings.camera_up.xyz);
         branch.origin += off_axis;
         branch.direction = settings.camera_right.w * branch.direction - off_axis;
     }

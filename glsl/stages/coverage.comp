@@ -60,9 +60,7 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     uint object = floatBitsToUint(visible_point.position_object.w);
     vec3 n = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
     vec3 origin = offset_origin(visible_point.position_object.xyz, n, reach_of(object));
-    float r = radius * sqrt(u.x);
-    float phi = 2.0 * PI * u.y;
-    vec3 along = basis(n) * vec3(r * cos(phi), r * sin(phi), 0.0);
+    vec3 along = basis(n) * vec3(radius * disc_point(u), 0.0);
     // Along the surface, into other objects and out of them again.
     bool inside = false;
     Side entered;

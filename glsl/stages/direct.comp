@@ -66,10 +66,8 @@ Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
         question.sky = sample_environment(u.yz, question.ray);
     } else {
         Surface emitter = surface_at(light.triangle, triangle_point(u.yz));
-        bool front = dot(position - emitter.position, emitter.geometric_normal) > 0.0;
         // Both ends move off their surfaces.
-        question.ray = offset_origin(emitter.position, front ? emitter.geometric_normal : -emitter.geometric_normal,
-                                     emitter.reach) - origin;
+        question.ray = origin_towards(emitter, position - emitter.position) - origin;
         question.end = 1.0 - ENDS_BEFORE;
         question.ignored = light.triangle;
         question.emitter = emitter;

@@ -1,6 +1,6 @@
 //! Camera rays: follows each pixel's path over mirrors and glass to its visible points.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use bytemuck::Zeroable;
 use glam::DVec3;
@@ -13,7 +13,7 @@ use super::gloss::{FOLLOWED_ALPHA, Reflector};
 use super::intersect::Ray;
 use super::light::emits;
 use super::random::{PathKind, Random};
-use super::sampling::encode_direction;
+use super::sampling::{disc_point, encode_direction};
 use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface};
 use super::texture::nearest_visible;
 use super::tiles::{pixel_of, pixel_slots};
@@ -171,8 +171,8 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
     if lens_radius > 0.0 {
         // All rays of a place in the picture meet where it is in focus.
         let [lens_u, lens_v, ..] = random.next4();
-        let (sin, cos) = (TAU * lens_v).sin_cos();
-        let off_axis = f64::from(lens_radius) * lens_u.sqrt() * (cos * right.normalize() + sin * up.normalize());
+        let on_lens = f64::from(lens_radius) * disc_point(lens_u, lens_v);
+        let off_axis = on_lens.x * right.normalize() + on_lens.y * up.normalize();
         origin += off_axis;
         direction = f64::from(focus) * direction - off_axis;
     }

@@ -1,13 +1,11 @@
 //! How much of the discs around visible points can have photons.
 
-use std::f64::consts::TAU;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::intersect::{Ray, nearest_hit};
 use super::random::{PathKind, Random};
-use super::sampling::{basis, decode_direction};
+use super::sampling::{basis, decode_direction, disc_point};
 use super::surface::{DIELECTRIC, Surface, offset_origin, reach_of, surface_at};
 use super::texture::share_there;
 use super::vector::{word, xyz};
@@ -70,9 +68,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
     };
     let n = decode_direction(word(point.weight_normal));
     let origin = offset_origin(xyz(point.position_object), n, reach_of(inputs.scene, object));
-    let (sin, cos) = (TAU * v).sin_cos();
-    let r = radius * u.sqrt();
-    let along = basis(n) * DVec3::new(r * cos, r * sin, 0.0);
+    let along = basis(n) * (radius * disc_point(u, v)).extend(0.0);
     // Along the surface, into other objects and out of them again.
     let (mut entered, mut ignored, mut done) = (None, None, 0.0);
     for _ in 0..MOST_CROSSINGS {

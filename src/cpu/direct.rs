@@ -139,13 +139,7 @@ fn sample_direct(
         }
         let (u, v) = triangle_point(u, v);
         let emitter = surface_at(inputs.scene, light.triangle, u, v);
-        let front = (position - emitter.position).dot(emitter.geometric_normal) > 0.0;
-        let towards_surface = if front {
-            emitter.geometric_normal
-        } else {
-            -emitter.geometric_normal
-        };
-        let direction = offset_origin(emitter.position, towards_surface, emitter.reach) - origin;
+        let direction = emitter.origin_towards(position - emitter.position) - origin;
         if !is_free(direction, 1.0 - ENDS_BEFORE, Some(light.triangle)) {
             return DVec3::ZERO;
         }

@@ -9,7 +9,7 @@ use super::environment::Environment;
 use super::intersect::Ray;
 use super::light::{Choice, choose_light};
 use super::random::Random;
-use super::sampling::{basis, cosine_direction, triangle_point};
+use super::sampling::{basis, cosine_direction, disc_point, triangle_point};
 use super::surface::{offset_origin, surface_at};
 use super::texture::{apply_textures, share_there};
 use super::vector::rgb;
@@ -97,10 +97,9 @@ fn from_triangle(
 
 /// From a disc across the direction of flight that covers the scene.
 fn from_afar(centre: DVec3, direction: DVec3, light: &Light, place: DVec2) -> Ray {
-    let (sin, cos) = (2.0 * PI * place.y).sin_cos();
-    let radius = (f64::from(light.area) / PI * place.x).sqrt();
+    let radius = (f64::from(light.area) / PI).sqrt();
     Ray {
-        origin: centre + basis(direction) * DVec3::new(radius * cos, radius * sin, 0.0),
+        origin: centre + basis(direction) * (radius * disc_point(place.x, place.y)).extend(0.0),
         direction,
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 /// An orthonormal basis around the unit vector `n`: Duff and others, «Building an Orthonormal Basis, Revisited», 2017.
 /// The very same basis as the device's, so that the same numbers give the same direction.
@@ -17,11 +17,15 @@ pub(super) fn basis(n: DVec3) -> DMat3 {
     )
 }
 
+/// A point uniform on the unit disc.
+pub(super) fn disc_point(u: f64, v: f64) -> DVec2 {
+    let (sin_phi, cos_phi) = (2.0 * PI * v).sin_cos();
+    u.sqrt() * DVec2::new(cos_phi, sin_phi)
+}
+
 /// A unit vector around the unit vector `n` with density cos θ / π (Malley's method).
 pub(super) fn cosine_direction(n: DVec3, u: f64, v: f64) -> DVec3 {
-    let (sin_phi, cos_phi) = (2.0 * PI * v).sin_cos();
-    let r = u.sqrt();
-    (basis(n) * DVec3::new(r * cos_phi, r * sin_phi, (1.0 - u).sqrt())).normalize()
+    (basis(n) * disc_point(u, v).extend((1.0 - u).sqrt())).normalize()
 }
 
 /// Barycentric coordinates (of the second and the third corner) of a point uniform on a triangle.
