@@ -211,7 +211,7 @@ device_structs! {
     }
 
     /// A material. Textures are indices of [`TextureLookup`]s, or [`NO_TEXTURE`]; each is a factor.
-    pub struct Material: 128 {
+    pub struct Material: 160 {
         /// Linear RGB albedo, reflectance or tint.
         pub base_color: [f32; 3],
         /// 0 matte, 1 mirror, 2 dielectric, 3 glossy.
@@ -260,6 +260,22 @@ device_structs! {
         pub alpha: f32,
         /// 20 over the Abbe number of a dielectric; 0: its index is that of every wavelength.
         pub dispersion: f32,
+        /// How much of a clear coat lies above; 0: none.
+        pub coat: f32,
+        /// Its square is GGX's α of the coat.
+        pub coat_roughness: f32,
+        /// Of how much there is of the coat, in red.
+        pub coat_texture: u32,
+        /// Of its roughness, in green.
+        pub coat_roughness_texture: u32,
+        /// Its normals in the space of the tangent.
+        pub coat_normal_texture: u32,
+        /// How far those lean.
+        pub coat_normal_scale: f32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
     }
 
     /// A light, and a cell of the alias table that chooses one. What its kind doesn't use is zero.
@@ -306,9 +322,10 @@ device_structs! {
     pub struct Gloss: 32 {
         /// rgb: albedo under the reflecting boundary; w: u32 bits, octahedral direction to the viewer.
         pub diffuse_viewer: [f32; 4],
-        /// rgb: reflectance of the boundary at normal incidence; w: u32 bits, two f16, at grazing incidence and GGX's α, 0
-        /// where the path followed the reflection itself.
-        pub f0_f90_alpha: [f32; 4],
+        /// rgb: reflectance of the boundary at normal incidence; w: u32 bits, the root of GGX's α in 4095ths, 0 where the path
+        /// followed the reflection itself, and above its 12 bits, in 1023rds of 10 bits each, the reflectance at grazing
+        /// incidence and how much of a coat there is.
+        pub f0_rest: [f32; 4],
     }
 
     /// A photon.

@@ -6,10 +6,11 @@
 
 #[path = "right/camera.rs"]
 mod camera;
+#[path = "right/coat.rs"]
+mod coat;
 #[path = "right/convergence.rs"]
 mod convergence;
 #[path = "../examples/make_scenes/scenes/document.rs"]
-#[expect(dead_code, reason = "the generator of scenes/ needs more of it")]
 mod document;
 #[path = "right/energy.rs"]
 mod energy;

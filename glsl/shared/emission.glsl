@@ -74,8 +74,11 @@ Emission emit(inout Random random) {
             normal = -normal;
         }
         float sides = material.double_sided != 0u ? 2.0 : 1.0;
-        emission = Emission(offset_origin(emitter.position, normal, emitter.reach), cosine_direction(normal, u.zw),
-                            material.emission * (PI * sides * light.area * share_there(emitter)), light.triangle, 0.0);
+        vec3 direction = cosine_direction(normal, u.zw);
+        emission = Emission(offset_origin(emitter.position, normal, emitter.reach), direction,
+                            emitted_radiance(material, dot(direction, normal)) *
+                                (PI * sides * light.area * share_there(emitter)),
+                            light.triangle, 0.0);
     }
     emission.flux /= light.probability;
     return emission;

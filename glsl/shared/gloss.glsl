@@ -14,31 +14,50 @@ struct Reflector {
     vec3 f0;      // reflectance of the boundary at normal and at grazing incidence
     float f90;
     float alpha;
+    float coat; // what lies above both, see KHR_materials_clearcoat: how much of a dielectric's reflection it has
 };
 
 // How a visible point's surface scatters.
 struct Gloss {
     vec4 diffuse_viewer; // w: uint bits, octahedral v
-    vec4 f0_f90_alpha;   // w: uint bits, two f16: f90 and α, α = 0 where the path followed the reflection itself
+    vec4 f0_rest;        // w: uint bits, √α · 4095, f90 · 1023 << 12 and coat · 1023 << 22; α = 0 where the path
+                         // followed the reflection itself
 };
 
 #define GLOSS(i) Gloss(TEXEL(GlossOf, 2u * (i)), TEXEL(GlossOf, 2u * (i) + 1u))
 
 Reflector reflector_of(Gloss gloss) {
-    vec2 rest = unpackHalf2x16(floatBitsToUint(gloss.f0_f90_alpha.w));
-    return Reflector(gloss.diffuse_viewer.rgb, gloss.f0_f90_alpha.rgb, rest.x, rest.y);
+    uint rest = floatBitsToUint(gloss.f0_rest.w);
+    float roughness = float(rest & 4095u) * (1.0 / 4095.0);
+    return Reflector(gloss.diffuse_viewer.rgb, gloss.f0_rest.rgb, float(rest >> 12u & 1023u) * (1.0 / 1023.0),
+                     roughness * roughness, float(rest >> 22u) * (1.0 / 1023.0));
 }
 
 Gloss gloss_of(Reflector reflector, vec3 v) {
-    uint rest = packHalf2x16(vec2(reflector.f90, reflector.alpha));
+    uint rest = uint(sqrt(reflector.alpha) * 4095.0 + 0.5) | uint(reflector.f90 * 1023.0 + 0.5) << 12u |
+                uint(reflector.coat * 1023.0 + 0.5) << 22u;
     return Gloss(vec4(reflector.diffuse, uintBitsToFloat(encode_direction(v))),
                  vec4(reflector.f0, uintBitsToFloat(rest)));
 }
 
-vec3 fresnel(Reflector reflector, float cosine) {
+// The fifth power of 1 − cosine.
+float schlick(float cosine) {
     float m = clamp(1.0 - cosine, 0.0, 1.0);
     float m2 = m * m;
-    return reflector.f0 + (reflector.f90 - reflector.f0) * (m2 * m2 * m);
+    return m2 * m2 * m;
+}
+
+vec3 fresnel(Reflector reflector, float cosine) {
+    return reflector.f0 + (reflector.f90 - reflector.f0) * schlick(cosine);
+}
+
+// Reflectance of a clear coat, whose index of refraction is 1.5.
+const float COAT_F0 = 0.04;
+
+// What a coat lets through to what lies below. KHR_materials_clearcoat takes the cosine to the viewer; that to the
+// microfacet's normal is the same where the coat is smooth, and both ways of the light are one.
+float coat_passes(float coat, float cosine) {
+    return 1.0 - coat * mix(COAT_F0, 1.0, schlick(cosine));
 }
 
 // Density of microfacet normals. The sine comes from the cross product: 1 − cos² of a small angle is rounding.
@@ -71,7 +90,8 @@ vec3 brdf(Reflector reflector, vec3 n, vec3 v, vec3 l) {
     float alpha = max(reflector.alpha, SMOOTH_ALPHA);
     float visibility = 0.5 / (nl * masking_root(alpha, nv) + nv * masking_root(alpha, nl));
     float lobe = reflector.alpha < SMOOTH_ALPHA ? 0.0 : ggx(alpha, n, h) * visibility;
-    return nv > 0.0 && nl > 0.0 ? (1.0 - f) * reflector.diffuse * (1.0 / PI) + f * lobe : vec3(0.0);
+    vec3 value = (1.0 - f) * reflector.diffuse * (1.0 / PI) + f * lobe;
+    return nv > 0.0 && nl > 0.0 ? coat_passes(reflector.coat, dot(v, h)) * value : vec3(0.0);
 }
 
 // Share of the samples that go to the boundary's reflection: at least a quarter, for what it mirrors may be bright.
@@ -110,8 +130,8 @@ float reflected_density(float alpha, vec3 n, vec3 v, vec3 l) {
 vec3 reflected_weight(Reflector reflector, vec3 n, vec3 v, vec3 l) {
     float nv = dot(n, v);
     float nl = dot(n, l);
-    if (reflector.alpha < SMOOTH_ALPHA) {
-        return fresnel(reflector, nv);
-    }
-    return nl > 0.0 ? fresnel(reflector, dot(v, normalize(v + l))) * joint_masking(reflector.alpha, nv, nl) : vec3(0.0);
+    bool smooth_boundary = reflector.alpha < SMOOTH_ALPHA;
+    float vh = smooth_boundary ? nv : dot(v, normalize(v + l));
+    float masking = smooth_boundary ? 1.0 : (nl > 0.0 ? joint_masking(reflector.alpha, nv, nl) : 0.0);
+    return fresnel(reflector, vh) * (coat_passes(reflector.coat, vh) * masking);
 }

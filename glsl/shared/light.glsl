@@ -76,6 +76,15 @@ bool emits(Material material, bool front) {
     return front || material.double_sided != 0u;
 }
 
+// Radiance at this cosine to the normal: a coat lies on lamps too.
+vec3 emitted_radiance(Material material, float cosine) {
+    float passed = 1.0;
+    if (CLEARCOAT) {
+        passed = coat_passes(material.coat, cosine);
+    }
+    return passed * material.emission;
+}
+
 // How much of its intensity a spot has at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as
 // KHR_lights_punctual recommends.
 float spot_falloff(PunctualLight light, float versine) {

@@ -13,6 +13,8 @@ layout(constant_id = 15) const bool ENVIRONMENT = false;
 layout(constant_id = 16) const bool TEXTURED = false;
 layout(constant_id = 17) const bool ALPHA = false;
 layout(constant_id = 18) const bool DISPERSION = false;
+layout(constant_id = 21) const bool CLEARCOAT = false;
+layout(constant_id = 22) const bool SPECULAR_GLASS = false;
 
 const uint MISS = 0xffffffffu;
 
@@ -70,9 +72,18 @@ struct Material {
     float alpha_cutoff;
     float alpha;
     float dispersion; // 20 over the Abbe number
+    float coat;       // how much of it there is
+    float coat_roughness;
+    // As the textures above.
+    uint coat_texture;
+    uint coat_roughness_texture;
+    uint coat_normal_texture;
+    float coat_normal_scale;
+    uint padding0;
+    uint padding1;
 };
 
-const uint MATERIAL_TEXELS = 8u;
+const uint MATERIAL_TEXELS = 10u;
 
 uniform usamplerBuffer Bvh;
 uniform usamplerBuffer HavelTriangles;
@@ -99,6 +110,9 @@ Material material_at(uint i) {
     if (GLOSSY) {
         specular = TEXEL(Materials, MATERIAL_TEXELS * i + 3u);
     }
+    if (SPECULAR_GLASS) {
+        specular = TEXEL(Materials, MATERIAL_TEXELS * i + 3u);
+    }
     if (DIELECTRICS) {
         inside = TEXEL_BITS(Materials, MATERIAL_TEXELS * i + 4u);
     }
@@ -106,9 +120,14 @@ Material material_at(uint i) {
     if (DISPERSION) {
         dispersion = TEXEL(Materials, MATERIAL_TEXELS * i + 7u).w;
     }
+    vec2 coat = vec2(0.0);
+    if (CLEARCOAT) {
+        coat = TEXEL(Materials, MATERIAL_TEXELS * i + 8u).xy;
+    }
     return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, uintBitsToFloat(rest.y),
                     uintBitsToFloat(rest.z), uintBitsToFloat(rest.w), specular.rgb, specular.w,
-                    uintBitsToFloat(inside.xyz), inside.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0u, 0.0, 0.0, dispersion);
+                    uintBitsToFloat(inside.xyz), inside.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0u, 0.0, 0.0, dispersion,
+                    coat.x, coat.y, 0u, 0u, 0u, 0.0, 0u, 0u);
 }
 
 bool is_mirror(Material material) {
@@ -142,6 +161,10 @@ bool choose_part(inout Material material, inout float u) {
     return mixed;
 }
 
+bool is_coated(Material material) {
+    return CLEARCOAT && material.coat > 0.0;
+}
+
 bool is_glossy(Material material) {
     return GLOSSY && material.surface == GLOSSY_SURFACE;
 }
@@ -153,7 +176,8 @@ bool is_matte(Material material) {
 Reflector reflector_of(Material material) {
     return Reflector(material.base_color * (1.0 - material.metallic),
                      mix(material.specular_f0, material.base_color, material.metallic),
-                     mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness);
+                     mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness,
+                     material.coat);
 }
 
 struct Hit {
@@ -169,6 +193,7 @@ struct Surface {
     vec3 reach;            // largest coordinates of the triangle's corners, without their signs
     vec3 geometric_normal; // of the triangle's front
     vec3 shading_normal;   // on the same side
+    vec3 coat_normal;      // likewise, of a clear coat
     vec2 uv;               // barycentric coordinates of the second and the third corner
     uint triangle;
     uint object;
@@ -199,6 +224,7 @@ Surface surface_at(uint index, vec2 uv) {
     surface.reach = max(max(abs(triangle.p0.xyz), abs(triangle.p1.xyz)), abs(triangle.p2.xyz));
     surface.geometric_normal = normalize(cross(e1, e2));
     surface.shading_normal = interpolated_normal(triangle, uv, surface.geometric_normal);
+    surface.coat_normal = surface.shading_normal;
     surface.uv = uv;
     surface.triangle = index;
     surface.object = triangle.object;

@@ -73,7 +73,9 @@ Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium, Random r
     }
     Encounter met = encounter(hit, direction, medium);
     bool dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
-    vec3 emission = emits(met.material, met.facing.front) ? met.material.emission : vec3(0.0);
+    vec3 emission = emits(met.material, met.facing.front)
+                        ? emitted_radiance(met.material, -dot(direction, met.facing.geometric_normal))
+                        : vec3(0.0);
     if (ABSORPTION) {
         emission *= transmittance(met.through, hit.t);
     }
@@ -150,15 +152,20 @@ void main() {
                 branch.throughput *= transmittance(met.through, hit.t);
             }
             if (emits(material, facing.front)) {
-                branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * material.emission;
+                vec3 emission = emitted_radiance(material, -dot(branch.direction, facing.geometric_normal));
+                branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * emission;
             }
             branch.emission_seen = false;
-            // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
-            Reflector reflector = Reflector(material.base_color, vec3(0.0), 0.0, 0.0);
             if (is_mixed(material)) {
                 u = next4(random);
                 choose_part(material, u.x);
             }
+            if (is_coated(material)) {
+                u = next4(random);
+                branch.throughput *= choose_layer(material, facing, surface, branch.direction, u.x);
+            }
+            // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
+            Reflector reflector = Reflector(material.base_color, vec3(0.0), 0.0, 0.0, 0.0);
             if (is_glossy(material)) {
                 reflector = reflector_of(material);
             }
@@ -172,7 +179,11 @@ void main() {
                 branch.ignored = surface.triangle;
                 u = next4(random);
                 if (is_mirror(material)) {
-                    branch.throughput *= fresnel_schlick(material.base_color, dot(viewer, facing.shading_normal));
+                    float cosine = dot(viewer, facing.shading_normal);
+                    branch.throughput *= fresnel_schlick(material.base_color, cosine);
+                    if (is_coated(material)) {
+                        branch.throughput *= coat_passes(material.coat, cosine);
+                    }
                     branch.direction = mirror_direction(facing, branch.direction);
                 } else if (is_glossy(material)) {
                     Branch reflected = branch;
@@ -228,7 +239,7 @@ void main() {
                         branch.emission_seen = reflect_now;
                     }
                     branch.direction = reflect_now ? boundary.reflected : boundary.refracted;
-                    branch.throughput *= reflect_now ? vec3(boundary.reflected_weight) : transmission;
+                    branch.throughput *= reflect_now ? boundary.reflected_weight : transmission;
                     branch.medium = reflect_now ? met.through : met.beyond;
                     ended = largest(branch.throughput) <= 0.0;
                 }

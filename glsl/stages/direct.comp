@@ -93,7 +93,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     question.end = 1e30;
     question.ignored = MISS;
     // A reflection may be too narrow for points of lights to find it.
-    Reflector reflector = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0);
+    Reflector reflector = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0);
     vec3 viewer = vec3(0.0);
     float bsdf_sampling = settings.bsdf_sampling;
     float reflections = 0.0; // of the directions of the BSDF
@@ -161,7 +161,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
         }
         // A ray that met the light had its chance to pass it.
         float there = by_bsdf ? 1.0 : share_there(emitter);
-        radiance = there * material.emission;
+        radiance = there * emitted_radiance(material, abs(cos_light));
         of_light = light.probability * distance2 / (light.area * abs(cos_light));
     }
     float cos_surface = dot(direction, shading_normal);

@@ -11,7 +11,7 @@ use super::dispersion::disperse;
 use super::environment::Environment;
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
 use super::intersect::Ray;
-use super::light::emits;
+use super::light::{emits, emitted_radiance};
 use super::random::{PathKind, Random};
 use super::sampling::{disc_point, encode_direction};
 use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface};
@@ -52,7 +52,8 @@ fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u
     let material = met.surface.material;
     let dark = material.surface == MATTE && rgb(material.base_color).max_element() == 0.0;
     if emits(&material, met.facing.front) {
-        (rgb(material.emission) * transmittance(inputs, met.through, hit.t), dark)
+        let emission = emitted_radiance(&material, -ray.direction.dot(met.facing.geometric_normal));
+        (emission * transmittance(inputs, met.through, hit.t), dark)
     } else {
         (DVec3::ZERO, dark)
     }
@@ -203,11 +204,11 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             };
             let incoming = branch.ray.direction;
             let met = Encounter::new(inputs, hit, incoming, branch.medium);
-            let (surface, facing) = (met.surface, met.facing);
+            let (surface, mut facing) = (met.surface, met.facing);
             branch.throughput *= transmittance(inputs, met.through, hit.t);
             let base_color = rgb(surface.material.base_color);
             if emits(&surface.material, facing.front) {
-                let emission = rgb(surface.material.emission);
+                let emission = emitted_radiance(&surface.material, -incoming.dot(facing.geometric_normal));
                 branch.emitted += if branch.emission_seen {
                     DVec3::ZERO
                 } else {
@@ -218,6 +219,10 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let mut material = surface.material;
             if is_mixed(&material) {
                 choose_part(&mut material, random.next4()[0]);
+            }
+            if material.coat > 0.0 {
+                let [u, ..] = random.next4();
+                branch.throughput *= facing.choose_layer(&mut material, surface.coat_normal, incoming, u);
             }
             let kind = material.surface;
             let (is_matte, is_glossy) = (kind == MATTE, kind == GLOSSY);
@@ -270,7 +275,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 break seen(inputs, &branch, &surface, &facing, stopping);
             }
             branch.ray.direction = if kind == MIRROR {
-                branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
+                branch.throughput *= facing.mirror_reflectance(&material, incoming);
                 facing.reflect(incoming)
             } else {
                 branch.throughput *= disperse(&mut material, &mut branch.wavelength, &mut random);

@@ -10,12 +10,12 @@ use super::camera::SeenSlice;
 use super::environment::{Environment, Sky};
 use super::gloss::Reflector;
 use super::intersect::Ray;
-use super::light::{Arriving, arriving_from, choose_light, emits, is_punctual};
+use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
 use super::random::{PathKind, Random};
 use super::sampling::{cosine_direction, decode_direction, triangle_point};
 use super::surface::{offset_origin, reach_of, surface_at};
 use super::texture::{apply_textures, nearest_visible, share_there};
-use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
+use super::vector::{from_two_floats, to_two_floats, word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
 use crate::layout::{DirectSum, ENVIRONMENT_LIGHT, NO_LIGHT, NO_OBJECT, VisiblePoint};
@@ -162,7 +162,7 @@ fn sample_direct(
     if !emits(&emitter.material, cos_light > 0.0) || direction.dot(shading_normal) <= 0.0 || cos_light == 0.0 {
         return DVec3::ZERO;
     }
-    let radiance = there * rgb(emitter.material.emission);
+    let radiance = there * emitted_radiance(&emitter.material, cos_light.abs());
     let density = f64::from(light.probability) * to_light.length_squared() / (f64::from(light.area) * cos_light.abs());
     seen(Sky { radiance, density }, direction)
 }

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::Inputs;
 use super::environment::Environment;
 use super::intersect::Ray;
-use super::light::{Choice, choose_light};
+use super::light::{Choice, choose_light, emitted_radiance};
 use super::random::Random;
 use super::sampling::{basis, cosine_direction, disc_point, triangle_point};
 use super::surface::{offset_origin, surface_at};
@@ -90,8 +90,8 @@ fn from_triangle(
         origin: offset_origin(emitter.position, normal, emitter.reach),
         direction: cosine_direction(normal, direction.x, direction.y),
     };
-    let flux =
-        rgb(emitter.material.emission) * (PI * sides * f64::from(light.area) * share_there(inputs.scene, &emitter));
+    let radiance = emitted_radiance(&emitter.material, ray.direction.dot(normal));
+    let flux = radiance * (PI * sides * f64::from(light.area) * share_there(inputs.scene, &emitter));
     (ray, flux, Some(light.triangle))
 }
 

@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use half::f16;
 
 use super::sampling::{basis, decode_direction, encode_direction};
 use super::vector::{rgb, with_word, word, xyz};
@@ -25,6 +24,16 @@ pub struct Reflector {
     pub f90: f64,
     /// GGX's α.
     pub alpha: f64,
+    /// What lies above both: how much of a dielectric's reflection it has.
+    pub coat: f64,
+}
+
+/// Reflectance of a clear coat, whose index of refraction is 1.5, at normal incidence.
+pub(super) const COAT_F0: f64 = 0.04;
+
+/// What a coat lets through to what lies below.
+pub fn coat_passes(coat: f64, cosine: f64) -> f64 {
+    1.0 - coat * (COAT_F0 + (1.0 - COAT_F0) * (1.0 - cosine).clamp(0.0, 1.0).powi(5))
 }
 
 impl Reflector {
@@ -36,6 +45,7 @@ impl Reflector {
             f0: rgb(material.specular_f0).lerp(base, metallic),
             f90: f64::from(material.specular_f90) * (1.0 - metallic) + metallic,
             alpha: f64::from(material.roughness).powi(2),
+            coat: f64::from(material.coat),
         }
     }
 
@@ -46,6 +56,7 @@ impl Reflector {
             f0: DVec3::ZERO,
             f90: 0.0,
             alpha: 0.0,
+            coat: 0.0,
         }
     }
 
@@ -56,23 +67,24 @@ impl Reflector {
 
     /// What a visible point keeps, and the direction to the viewer.
     pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
-        let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
-        let rest = word(gloss.f0_f90_alpha);
+        let rest = word(gloss.f0_rest);
+        let part = |shift: u32| f64::from(rest >> shift & 1023) / 1023.0;
         let reflector = Self {
             diffuse: xyz(gloss.diffuse_viewer),
-            f0: xyz(gloss.f0_f90_alpha),
-            f90: half(rest),
-            alpha: half(rest >> 16),
+            f0: xyz(gloss.f0_rest),
+            f90: part(12),
+            alpha: (f64::from(rest & 4095) / 4095.0).powi(2),
+            coat: part(22),
         };
         (reflector, decode_direction(word(gloss.diffuse_viewer)))
     }
 
     pub(super) fn to_gloss(self, v: DVec3) -> Gloss {
-        let half = |value: f64| u32::from(f16::from_f64(value).to_bits());
-        let rest = half(self.f90) | half(self.alpha) << 16;
+        let part = |value: f64| (value * 1023.0).round() as u32;
+        let rest = (self.alpha.sqrt() * 4095.0).round() as u32 | part(self.f90) << 12 | part(self.coat) << 22;
         Gloss {
             diffuse_viewer: with_word(self.diffuse, encode_direction(v)),
-            f0_f90_alpha: with_word(self.f0, rest),
+            f0_rest: with_word(self.f0, rest),
         }
     }
 
@@ -103,12 +115,13 @@ impl Reflector {
         }
         let h = (v + l).normalize();
         let f = self.fresnel(v.dot(h));
+        let passes = coat_passes(self.coat, v.dot(h));
         let base = (1.0 - f) * self.diffuse / PI;
         if self.is_smooth() {
-            return base;
+            return passes * base;
         }
         let visibility = 0.5 / (nl * self.masking_root(nv) + nv * self.masking_root(nl));
-        base + f * self.ggx(n, h) * visibility
+        passes * (base + f * self.ggx(n, h) * visibility)
     }
 
     /// Share of the samples that go to the boundary's reflection.
@@ -163,11 +176,12 @@ impl Reflector {
     pub fn reflected_weight(&self, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
         let (nv, nl) = (n.dot(v), n.dot(l));
         if self.is_smooth() {
-            return self.fresnel(nv);
+            return self.fresnel(nv) * coat_passes(self.coat, nv);
         }
         if nl <= 0.0 {
             return DVec3::ZERO;
         }
-        self.fresnel(v.dot((v + l).normalize())) * self.joint_masking(nv, nl)
+        let vh = v.dot((v + l).normalize());
+        self.fresnel(vh) * coat_passes(self.coat, vh) * self.joint_masking(nv, nl)
     }
 }

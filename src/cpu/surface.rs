@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::gloss::Reflector;
+use super::gloss::{COAT_F0, Reflector, coat_passes};
 use super::sampling::decode_direction;
 use super::vector::{rgb, word, xyz};
 use crate::layout::{Material, SMOOTH_SHADED, ShadingTriangle};
@@ -34,6 +34,8 @@ pub(super) struct Surface {
     pub geometric_normal: DVec3,
     /// On the same side.
     pub shading_normal: DVec3,
+    /// Likewise, of a clear coat.
+    pub coat_normal: DVec3,
     pub object: u32,
     /// Without its textures, until [`super::texture::apply_textures`].
     pub material: Material,
@@ -50,13 +52,15 @@ pub(super) fn surface_at(scene: &PackedScene, index: u32, u: f64, v: f64) -> Sur
     let triangle = &scene.shading_triangles[index as usize];
     let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(xyz);
     let geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
+    let shading_normal = interpolated_normal(triangle, u, v, geometric_normal);
     Surface {
         triangle: index,
         uv: [u, v],
         position: p0 + u * (p1 - p0) + v * (p2 - p0),
         reach: p0.abs().max(p1.abs()).max(p2.abs()),
         geometric_normal,
-        shading_normal: interpolated_normal(triangle, u, v, geometric_normal),
+        shading_normal,
+        coat_normal: shading_normal,
         object: triangle.object,
         material: scene.materials[triangle.material as usize],
         material_index: triangle.material,
@@ -159,6 +163,37 @@ impl Facing {
         (direction, weight)
     }
 
+    /// What a ray meets of a coated surface is by chance the coat, which then is the material, or what lies below it. Returns
+    /// the factor of what the path carries. The inside of glass has no coat.
+    pub fn choose_layer(&mut self, material: &mut Material, coat_normal: DVec3, incoming: DVec3, u: f64) -> f64 {
+        if !(self.front || material.surface != DIELECTRIC || material.thin != 0) {
+            return 1.0;
+        }
+        let n = if self.front { coat_normal } else { -coat_normal };
+        let n = if incoming.dot(n) < 0.0 {
+            n
+        } else {
+            self.geometric_normal
+        };
+        let coat = f64::from(material.coat);
+        let p = (1.0 - coat_passes(coat, -incoming.dot(n))).clamp(0.25 * coat, 0.9);
+        if u >= p {
+            return 1.0 / (1.0 - p);
+        }
+        self.shading_normal = n;
+        *material = Material {
+            surface: GLOSSY,
+            base_color: [0.0; 3],
+            metallic: 0.0,
+            roughness: material.coat_roughness,
+            specular_f0: [(COAT_F0 * coat) as f32; 3],
+            specular_f90: material.coat,
+            coat: 0.0,
+            ..*material
+        };
+        1.0 / p
+    }
+
     /// Where a glossy surface scatters a photon to, instead of the cosine-distributed `outgoing` or as that says, and the
     /// part of the flux that goes there.
     pub fn scatter(&self, reflector: &Reflector, incoming: DVec3, u: [f64; 4], outgoing: DVec3) -> (DVec3, DVec3) {
@@ -168,7 +203,8 @@ impl Facing {
         let reflects = u[3] < p;
         if reflector.is_smooth() {
             return if reflects {
-                (self.reflect(incoming), reflector.fresnel(nv) / p)
+                let passes = coat_passes(reflector.coat, nv);
+                (self.reflect(incoming), reflector.fresnel(nv) * passes / p)
             } else {
                 (outgoing, PI / (1.0 - p) * reflector.brdf(n, v, outgoing))
             };
@@ -183,11 +219,18 @@ impl Facing {
         (outgoing, reflector.brdf(n, v, outgoing) * (cosine / density.max(1e-20)))
     }
 
-    /// Reflectance of a mirror with this base colour: Schlick's approximation, as glTF 2.0, appendix B, has it.
-    pub fn mirror_reflectance(&self, base_color: [f32; 3], incoming: DVec3) -> DVec3 {
-        let f0 = rgb(base_color);
-        let grazing = (1.0 + incoming.dot(self.shading_normal)).clamp(0.0, 1.0);
-        f0 + (1.0 - f0) * grazing.powi(5)
+    /// Reflectance of a mirror of this material: Schlick's approximation, as glTF 2.0, appendix B, has it.
+    pub fn mirror_reflectance(&self, material: &Material, incoming: DVec3) -> DVec3 {
+        let f0 = rgb(material.base_color);
+        let cosine = -incoming.dot(self.shading_normal);
+        let passes = coat_passes(f64::from(material.coat), cosine);
+        passes * (f0 + (1.0 - f0) * (1.0 - cosine).clamp(0.0, 1.0).powi(5))
+    }
+
+    /// What the shading normal's cosine makes of a photon's flux, which is per area of the geometric surface: Veach, «Robust
+    /// Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
+    pub fn landing_correction(&self, incoming: DVec3) -> f64 {
+        incoming.dot(self.shading_normal) / incoming.dot(self.geometric_normal)
     }
 }
 
@@ -200,10 +243,10 @@ pub(super) struct Boundary {
     pub reflected: DVec3,
     /// `None` for total internal reflection.
     pub refracted: Option<DVec3>,
-    /// What microfacets let through of what is reflected.
-    pub reflected_weight: f64,
+    /// What microfacets and a coat let through of what is reflected.
+    pub reflected_weight: DVec3,
     /// And of what is refracted.
-    pub refracted_weight: f64,
+    pub refracted_weight: DVec3,
 }
 
 impl Boundary {
@@ -236,13 +279,18 @@ impl Boundary {
             eta,
             reflected: micro.reflect(incoming),
             refracted: None,
-            reflected_weight: match (rough, up > 0.0) {
+            reflected_weight: DVec3::splat(match (rough, up > 0.0) {
                 (false, _) => 1.0,
                 (true, true) => microfacets.joint_masking(nv, up),
                 (true, false) => 0.0,
-            },
-            refracted_weight: 1.0,
+            }),
+            refracted_weight: DVec3::ONE,
         };
+        let coat = f64::from(material.coat);
+        let enters = facing.front || thin;
+        if enters {
+            boundary.reflected_weight *= coat_passes(coat, nv);
+        }
         if sin2_t >= 1.0 {
             return boundary;
         }
@@ -259,11 +307,24 @@ impl Boundary {
         }
         if rough {
             let down = -refracted.dot(n);
-            boundary.refracted_weight = if down > 0.0 { microfacets.masking(down) } else { 0.0 };
+            boundary.refracted_weight = DVec3::splat(if down > 0.0 { microfacets.masking(down) } else { 0.0 });
         }
+        boundary.refracted_weight *= coat_passes(coat, if enters { nv } else { -refracted.dot(n) });
+        // KHR_materials_specular changes the ends of Fresnel's curve.
+        let f0 = normal_reflectance(ior);
+        let ends = rgb(material.specular_f0) * (f0 / normal_reflectance(f64::from(material.ior)).max(1e-10));
+        let grazing = DVec3::splat(f64::from(material.specular_f90));
+        let changed = ends.lerp(grazing, (boundary.reflectance - f0) / (1.0 - f0));
+        boundary.reflected_weight *= changed / boundary.reflectance.max(1e-10);
+        boundary.refracted_weight *= (1.0 - changed) / (1.0 - boundary.reflectance);
         boundary.refracted = Some(refracted);
         boundary
     }
+}
+
+/// A dielectric's reflectance at normal incidence.
+fn normal_reflectance(ior: f64) -> f64 {
+    ((ior - 1.0) / (ior + 1.0)).powi(2)
 }
 
 #[cfg(test)]

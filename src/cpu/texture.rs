@@ -78,13 +78,24 @@ pub(super) fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
         material.specular_f0 = times(material.specular_f0, value.truncate());
     }
     if let Some(value) = at(textures.normal_texture) {
-        surface.shading_normal = leaning_normal(surface, &place, value.truncate(), textures.normal_scale.into());
+        let scale = textures.normal_scale.into();
+        surface.shading_normal = leaning_normal(surface.shading_normal, surface, &place, value.truncate(), scale);
+    }
+    let material = &mut surface.material;
+    if let Some(value) = at(textures.coat_texture) {
+        material.coat *= value.x as f32;
+    }
+    if let Some(value) = at(textures.coat_roughness_texture) {
+        material.coat_roughness *= value.y as f32;
+    }
+    if let Some(value) = at(textures.coat_normal_texture) {
+        let scale = textures.coat_normal_scale.into();
+        surface.coat_normal = leaning_normal(surface.coat_normal, surface, &place, value.truncate(), scale);
     }
 }
 
-/// The normal that a texture leans to, on the side of the geometric one.
-fn leaning_normal(surface: &Surface, place: &Place, value: DVec3, scale: f64) -> DVec3 {
-    let n = surface.shading_normal;
+/// The normal that a texture leans `n` to, on the side of the geometric one.
+fn leaning_normal(n: DVec3, surface: &Surface, place: &Place, value: DVec3, scale: f64) -> DVec3 {
     let t = place.tangent.truncate();
     let t = t - t.dot(n) * n;
     if t.length_squared() < 1e-12 || place.tangent.w == 0.0 {

@@ -10,6 +10,7 @@ mod buffer;
 mod builder;
 mod bvh;
 mod camera;
+mod coat;
 mod contact;
 mod curve;
 mod diagnostic;
@@ -126,6 +127,15 @@ pub struct Gloss {
     pub specular_f90: f32,
 }
 
+/// KHR_materials_clearcoat: a dielectric's reflection above all others.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Coat {
+    /// How much of it there is, 0 ..= 1; 0 for none.
+    pub factor: f32,
+    /// Its square is GGX's α; 0 ..= 1.
+    pub roughness: f32,
+}
+
 /// Where a surface is there at all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Alpha {
@@ -162,6 +172,12 @@ pub struct MaterialTextures {
     pub specular: Option<u32>,
     /// Reflectance at normal incidence.
     pub specular_color: Option<u32>,
+    /// How much of a clear coat there is, in red.
+    pub coat: Option<u32>,
+    /// Its roughness, in green.
+    pub coat_roughness: Option<u32>,
+    /// Its normals, and how far they lean.
+    pub coat_normal: Option<(u32, f32)>,
 }
 
 /// A glTF material, reduced to what is supported.
@@ -171,6 +187,8 @@ pub struct Material {
     pub name: String,
     /// How it scatters.
     pub surface: Surface,
+    /// What lies above that.
+    pub coat: Coat,
     /// Linear RGB albedo (matte), reflectance (mirror) or tint of each crossing (dielectric); each in 0 ..= 1.
     pub base_color: Vec3,
     /// Emitted radiance, linear RGB; zero for what isn't a light.

@@ -202,6 +202,14 @@ fn material(material: &super::Material) -> Material {
         alpha_cutoff,
         alpha,
         dispersion: inside.dispersion,
+        coat: material.coat.factor,
+        coat_roughness: material.coat.roughness,
+        coat_texture: textures.coat.unwrap_or(NO_TEXTURE),
+        coat_roughness_texture: textures.coat_roughness.unwrap_or(NO_TEXTURE),
+        coat_normal_texture: textures.coat_normal.map_or(NO_TEXTURE, |(texture, _)| texture),
+        coat_normal_scale: textures.coat_normal.map_or(0.0, |(_, scale)| scale),
+        padding0: 0,
+        padding1: 0,
     }
 }
 

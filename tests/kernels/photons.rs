@@ -105,6 +105,7 @@ fn photons_that_pass_glass_and_mirrors_land_where_the_cpus_do() {
 fn photons_that_microfacets_scatter_land_where_the_cpus_do() {
     assert_photons_agree("glossy", photons_carry_all_light(), 1e-4, 0.995, 7000);
     assert_photons_agree("glasses", photons_carry_all_light(), 1e-4, 0.99, 7000);
+    assert_photons_agree("coats", photons_carry_all_light(), 1e-4, 0.99, 7000);
 }
 
 #[test]

@@ -56,6 +56,8 @@ fn both_backends_render_the_same_picture() {
         ("glossy", Estimator::Sppm, Direct::Light),
         ("glossy", Estimator::Ppm, Direct::Photons),
         ("glasses", Estimator::Sppm, Direct::Light),
+        ("coats", Estimator::Sppm, Direct::Light),
+        ("coats", Estimator::Ppm, Direct::Photons),
         ("textures", Estimator::Sppm, Direct::Light),
         ("textures", Estimator::Ppm, Direct::Photons),
         ("glossy, lit", Estimator::Sppm, Direct::Light),

@@ -15,21 +15,23 @@ use crate::stage::{camera_ray, subject};
 const ALPHAS: [f64; 5] = [0.01, 0.1, 0.3, 0.6, 1.0];
 const COSINES: [f64; 4] = [0.05, 0.3, 0.7, 1.0];
 
-fn metal(alpha: f64) -> Reflector {
+pub fn metal(alpha: f64) -> Reflector {
     Reflector {
         diffuse: DVec3::ZERO,
         f0: dvec3(0.95, 0.64, 0.3),
         f90: 1.0,
         alpha,
+        coat: 0.0,
     }
 }
 
-fn plastic(alpha: f64) -> Reflector {
+pub fn plastic(alpha: f64) -> Reflector {
     Reflector {
         diffuse: dvec3(0.8, 0.5, 0.1),
         f0: DVec3::splat(0.04),
         f90: 1.0,
         alpha,
+        coat: 0.0,
     }
 }
 
@@ -108,19 +110,22 @@ fn reflected_directions_have_the_density_that_is_said() {
 fn light_and_viewer_may_change_places() {
     for index in 0..10_000 {
         let [a, b, c, d] = uniform(index, PathKind::Camera);
-        let [e, ..] = uniform(index, PathKind::LightSample);
+        let [e, f, ..] = uniform(index, PathKind::LightSample);
         let direction = |cosine: f64, turn: f64| {
             let sin = (1.0 - cosine * cosine).sqrt();
             dvec3(sin * (2.0 * PI * turn).cos(), sin * (2.0 * PI * turn).sin(), cosine)
         };
         let (v, l) = (direction(a, b), direction(c, d));
-        let reflector = plastic(0.02 + e);
+        let reflector = Reflector {
+            coat: f,
+            ..plastic(0.02 + e)
+        };
         let (one, other) = (reflector.brdf(DVec3::Z, v, l), reflector.brdf(DVec3::Z, l, v));
         assert!((one - other).length() <= 1e-10 * one.length(), "{v} {l}: {one} {other}");
     }
 }
 
-/// ∫ BRDF · cos by the microfacet normals' own measure, and the base's by angle.
+/// ∫ BRDF · cos by the microfacet normals' own measure, and the base's by angle; without what a smooth boundary mirrors.
 pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
     let (n, v) = (DVec3::Z, viewer(cosine));
     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(steps);
@@ -144,7 +149,7 @@ pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
         sum += base.brdf(n, v, l) * PI;
         let (h, solid_angle) = microfacet(reflector.alpha, [s, turn]);
         let l = 2.0 * v.dot(h) * h - v;
-        if v.dot(h) > 0.0 && l.z > 0.0 {
+        if reflector.alpha > 0.0 && v.dot(h) > 0.0 && l.z > 0.0 {
             sum += mirrors.brdf(n, v, l) * l.z * 4.0 * v.dot(h) * solid_angle;
         }
     }

@@ -148,6 +148,7 @@ fn a_surface_that_is_half_clear_scatters_the_other_half() {
         f0: DVec3::splat(0.04),
         f90: 1.0,
         alpha: 0.0,
+        coat: 0.0,
     };
     for direct in [Direct::Light, Direct::Photons] {
         measured_and_expected(&subject, direct, |cosine| {

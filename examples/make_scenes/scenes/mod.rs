@@ -2,14 +2,13 @@
 
 mod document;
 mod mesh;
+mod spheres;
 
 use document::{
-    Document, File, Filter, clear, emitting, glass, light, matte, metallic_roughness, mirror, one_sided, png,
-    with_texture,
+    Document, File, Filter, clear, emitting, light, matte, metallic_roughness, mirror, one_sided, png, with_texture,
 };
 use glam::{DVec3, dvec3};
 use mesh::Mesh;
-use serde_json::Value;
 use serde_json::json;
 use std::f64::consts::FRAC_PI_2;
 
@@ -22,9 +21,10 @@ const BLACK: [f64; 3] = [0.0; 3];
 pub fn all() -> Vec<File> {
     [
         cornell(),
-        cornell_spheres(),
-        glossy(),
-        glasses(),
+        spheres::cornell_spheres(),
+        spheres::glossy(),
+        spheres::glasses(),
+        spheres::coats(),
         textures(),
         ring(),
         pool("pool", false),
@@ -56,59 +56,6 @@ fn cornell() -> Document {
         .rotated([0.0, 1.0, 0.0], -17_f64.to_radians());
     scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
     scene
-}
-
-/// The same room with a mirror and a glass sphere.
-fn cornell_spheres() -> Document {
-    let mut scene = cornell_room("cornell-spheres");
-    let mirror = scene.material(mirror("mirror", [0.95; 3]));
-    let glass = scene.material(clear("glass", 1.5));
-    let sphere = Mesh::icosphere(0.38, 4);
-    scene
-        .object("mirror-sphere", &sphere, mirror)
-        .at([-0.45, 0.3805, -0.35]);
-    scene.object("glass-sphere", &sphere, glass).at([0.42, 0.3805, 0.35]);
-    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
-    scene
-}
-
-/// The same room with a sphere of each of these materials.
-fn four_spheres(name: &'static str, materials: [Value; 4]) -> Document {
-    let mut scene = cornell_room(name);
-    let sphere = Mesh::icosphere(0.3, 4);
-    let places = [[-0.6, -0.4], [0.1, -0.55], [-0.25, 0.35], [0.5, 0.25]];
-    for (material, [x, z]) in materials.into_iter().zip(places) {
-        let material = scene.material(material);
-        scene.object("sphere", &sphere, material).at([x, 0.3005, z]);
-    }
-    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
-    scene
-}
-
-/// The same room with spheres of satin and of polished metal and of plastic, rough and smooth.
-fn glossy() -> Document {
-    four_spheres(
-        "glossy",
-        [
-            metallic_roughness("satin", [0.95, 0.7, 0.4], 1.0, 0.5),
-            metallic_roughness("polished", [0.9, 0.9, 0.92], 1.0, 0.2),
-            metallic_roughness("plastic", [0.15, 0.3, 0.7], 0.0, 0.35),
-            metallic_roughness("lacquer", [0.6, 0.08, 0.06], 0.0, 0.0),
-        ],
-    )
-}
-
-/// The same room with spheres of tinted, frosted, thin and half clear glass.
-fn glasses() -> Document {
-    four_spheres(
-        "glasses",
-        [
-            glass("tinted", 0.0, 1.0, Some(([0.1, 0.6, 0.3], 0.4))),
-            glass("frosted", 0.35, 1.0, Some(([1.0; 3], 1.0))),
-            glass("thin", 0.0, 1.0, None),
-            glass("half-clear", 0.2, 0.6, Some(([0.9, 0.7, 0.2], 0.5))),
-        ],
-    )
 }
 
 /// A golden ring on a table, lit from the side: the cardioid caustic.
@@ -180,6 +127,18 @@ fn tile_png() -> Vec<u8> {
     })
 }
 
+/// Normals of a stud, 32 × 32 texels.
+fn stud_png() -> Vec<u8> {
+    png(32, 32, |x, y| {
+        let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
+        let (x, y) = (at(x), -at(y));
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+        let normal = if z > 0.5 { [x, y, z] } else { [0.0, 0.0, 1.0] };
+        let [r, g, b] = normal.map(|value| (127.5 + 127.5 * value).round() as u8);
+        [r, g, b, 255]
+    })
+}
+
 /// The same room with a checkered floor, a wall of studs, a fence, a pane of smoke, a ball of metal and plaster, and a lamp of
 /// two colours: every kind of texture.
 fn textures() -> Document {
@@ -195,17 +154,7 @@ fn textures() -> Document {
         }),
         Filter::Nearest,
     );
-    let studs = scene.texture(
-        &png(32, 32, |x, y| {
-            let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
-            let (x, y) = (at(x), -at(y));
-            let z = (1.0 - x * x - y * y).max(0.0).sqrt();
-            let normal = if z > 0.5 { [x, y, z] } else { [0.0, 0.0, 1.0] };
-            let [r, g, b] = normal.map(|value| (127.5 + 127.5 * value).round() as u8);
-            [r, g, b, 255]
-        }),
-        Filter::Linear,
-    );
+    let studs = scene.texture(&stud_png(), Filter::Linear);
     let fence = scene.texture(
         &png(8, 8, |x, y| [120, 90, 50, if x % 4 == 0 || y == 4 { 255 } else { 0 }]),
         Filter::Nearest,
