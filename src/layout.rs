@@ -32,6 +32,11 @@ pub const TEXTURED: u32 = 4;
 /// Bit of [`ShadingTriangle::flags`]: parts of it may not be there, see [`Material::alpha_mode`].
 pub const SEE_THROUGH: u32 = 8;
 
+/// [`Material::sides`]: the back emits as the front does.
+pub const BACK_EMITS: u32 = 1;
+/// [`Material::sides`]: no camera sees the back.
+pub const BACK_HIDDEN: u32 = 2;
+
 /// Texture of a material that has none there.
 pub const NO_TEXTURE: u32 = u32::MAX;
 
@@ -220,8 +225,8 @@ device_structs! {
         pub emission: [f32; 3],
         /// Index of refraction inside.
         pub ior: f32,
-        /// 1 where the back emits as well.
-        pub double_sided: u32,
+        /// [`BACK_EMITS`], [`BACK_HIDDEN`].
+        pub sides: u32,
         /// How far the surface is a metal.
         pub metallic: f32,
         /// Of a glossy surface; its square is GGX's α.

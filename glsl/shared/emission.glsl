@@ -70,10 +70,11 @@ Emission emit(inout Random random) {
         Surface emitter = surface_at(light.triangle, triangle_point(place));
         Material material = material_of(emitter);
         vec3 normal = emitter.geometric_normal;
-        if (material.double_sided != 0u && w.y < 0.5) {
+        bool both_sides = emits(material, false);
+        if (both_sides && w.y < 0.5) {
             normal = -normal;
         }
-        float sides = material.double_sided != 0u ? 2.0 : 1.0;
+        float sides = both_sides ? 2.0 : 1.0;
         vec3 direction = cosine_direction(normal, u.zw);
         emission = Emission(offset_origin(emitter.position, normal, emitter.reach), direction,
                             emitted_radiance(material, dot(direction, normal)) *

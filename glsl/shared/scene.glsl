@@ -15,6 +15,7 @@ layout(constant_id = 17) const bool ALPHA = false;
 layout(constant_id = 18) const bool DISPERSION = false;
 layout(constant_id = 21) const bool CLEARCOAT = false;
 layout(constant_id = 22) const bool SPECULAR_GLASS = false;
+layout(constant_id = 23) const bool CULLING = false;
 
 const uint MISS = 0xffffffffu;
 
@@ -23,6 +24,9 @@ const uint NO_LIGHT = 0xffffffffu;
 // Flags of a triangle.
 const uint SMOOTH_SHADED = 1u; // the shading normals differ from the geometric one
 const uint TOUCHED = 2u;       // a dielectric's, and it may lie on a face of another object
+
+const uint BACK_EMITS = 1u;
+const uint BACK_HIDDEN = 2u;
 
 const uint MIRROR = 1u;
 const uint DIELECTRIC = 2u;
@@ -51,7 +55,7 @@ struct Material {
     uint surface;      // MIRROR, DIELECTRIC, GLOSSY_SURFACE or 0 for matte
     vec3 emission;     // radiance
     float ior;
-    uint double_sided; // emits on both sides
+    uint sides;        // BACK_EMITS, BACK_HIDDEN
     float metallic;
     float roughness;
     float transmission; // share of a dielectric's part that is no metal that passes light; the rest is glossy

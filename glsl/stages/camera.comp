@@ -148,6 +148,12 @@ void main() {
             Surface surface = met.surface;
             Material material = met.material;
             Facing facing = met.facing;
+            bool culled = CULLING && branch.depth == 0u && !facing.front && (material.sides & BACK_HIDDEN) != 0u;
+            if (culled) {
+                branch.origin = origin_towards(surface, branch.direction);
+                branch.ignored = surface.triangle;
+                continue;
+            }
             if (ABSORPTION) {
                 branch.throughput *= transmittance(met.through, hit.t);
             }

@@ -20,7 +20,7 @@ use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{Gloss, NO_OBJECT, VisiblePoint};
+use crate::layout::{BACK_HIDDEN, Gloss, NO_OBJECT, VisiblePoint};
 
 /// What is left of a path that splits.
 #[derive(Clone, Copy)]
@@ -205,6 +205,11 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let incoming = branch.ray.direction;
             let met = Encounter::new(inputs, hit, incoming, branch.medium);
             let (surface, mut facing) = (met.surface, met.facing);
+            if branch.depth == 0 && !facing.front && surface.material.sides & BACK_HIDDEN != 0 {
+                branch.ray.origin = surface.origin_towards(incoming);
+                branch.ignored = Some(surface.triangle);
+                continue;
+            }
             branch.throughput *= transmittance(inputs, met.through, hit.t);
             let base_color = rgb(surface.material.base_color);
             if emits(&surface.material, facing.front) {

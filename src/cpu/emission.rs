@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::Inputs;
 use super::environment::Environment;
 use super::intersect::Ray;
-use super::light::{Choice, choose_light, emitted_radiance};
+use super::light::{Choice, choose_light, emits, emitted_radiance};
 use super::random::Random;
 use super::sampling::{basis, cosine_direction, disc_point, triangle_point};
 use super::surface::{offset_origin, surface_at};
@@ -79,7 +79,7 @@ fn from_triangle(
     let (u, v) = triangle_point(place.x, place.y);
     let mut emitter = surface_at(inputs.scene, light.triangle, u, v);
     apply_textures(inputs.scene, &mut emitter);
-    let both_sides = emitter.material.double_sided != 0;
+    let both_sides = emits(&emitter.material, false);
     let normal = if both_sides && side < 0.5 {
         -emitter.geometric_normal
     } else {

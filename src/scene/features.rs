@@ -1,8 +1,8 @@
 //! What of the renderer a scene needs: the kernels are specialised for it and have no code for the rest.
 
 use crate::layout::{
-    DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH, SPOT_LIGHT,
-    ShadingTriangle, TEXTURED, TOUCHED,
+    BACK_HIDDEN, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH,
+    SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED,
 };
 
 /// [`Material::surface`] of a mirror.
@@ -72,6 +72,8 @@ features! {
     coat: "CLEARCOAT",
     /// Dielectrics that reflect more or less than their index says.
     specular_glass: "SPECULAR_GLASS",
+    /// Surfaces whose back no camera sees.
+    culling: "CULLING",
     /// A lens before the camera that is rendered.
     lens: "LENS",
 }
@@ -94,6 +96,7 @@ impl SceneFeatures {
             features.partly_clear |= mixed;
             features.absorption |= glass && material.absorption != [0.0; 3];
             features.dispersion |= glass && material.dispersion > 0.0;
+            features.culling |= material.sides & BACK_HIDDEN != 0;
             features.coat |= material.coat > 0.0;
             features.specular_glass |= glass && is_changed(material);
             features.textured |= triangle.flags & TEXTURED != 0;

@@ -85,7 +85,9 @@ impl Reader<'_> {
             coat,
             base_color,
             emission,
-            double_sided: self.json.double_sided || unlit,
+            back_emits: self.json.double_sided || unlit,
+            // Glass has an inside to be seen from.
+            back_hidden: !self.json.double_sided && !matches!(surface, Surface::Dielectric(_)),
             unlit,
             alpha: match self.json.alpha_mode {
                 Checked::Valid(AlphaMode::Opaque) => Alpha::Opaque,

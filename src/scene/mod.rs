@@ -194,7 +194,10 @@ pub struct Material {
     /// Emitted radiance, linear RGB; zero for what isn't a light.
     pub emission: Vec3,
     /// Whether the back side emits as well. (Every surface scatters on both sides.)
-    pub double_sided: bool,
+    pub back_emits: bool,
+    /// Whether a camera looks through the back side, as glTF 2.0 has it of surfaces with one side. It reflects light and throws
+    /// shadows all the same, and mirrors and glass show it.
+    pub back_hidden: bool,
     /// KHR_materials_unlit: it is seen as its emission, but lights nothing and reflects nothing.
     pub unlit: bool,
     /// Where it is there.

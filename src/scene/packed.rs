@@ -8,8 +8,9 @@ use super::{
     Alpha, Dielectric, Environment, Gloss, MaterialTextures, Scene, Surface, bvh, contact, environment, light_table,
 };
 use crate::layout::{
-    BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Light, MASK, Material, NO_LIGHT, NO_TEXTURE, OPAQUE,
-    ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED, TOUCHED, TRIANGLE_LIGHT, TextureLookup,
+    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Light, MASK, Material,
+    NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED, TOUCHED,
+    TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// What the ray stages read, in the order of the BVH's leaves.
@@ -182,7 +183,7 @@ fn material(material: &super::Material) -> Material {
         surface,
         emission: material.emission.to_array(),
         ior: inside.ior,
-        double_sided: material.double_sided.into(),
+        sides: if material.back_emits { BACK_EMITS } else { 0 } | if material.back_hidden { BACK_HIDDEN } else { 0 },
         metallic: gloss.metallic,
         roughness: glass.map_or(gloss.roughness, |glass| glass.roughness),
         transmission: inside.transmission,

@@ -57,7 +57,7 @@ fn the_base_colour_is_the_albedo_of_a_matte_surface() {
     assert_eq!(material.base_color.to_array(), [0.25, 0.5, 0.75]);
     assert_eq!(material.emission.to_array(), [0.0; 3]);
     assert_eq!(material.name, "floor");
-    assert!(material.double_sided);
+    assert!(material.back_emits);
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn metallic_1_with_roughness_0_is_a_mirror() {
     let material = loaded(json!({"pbrMetallicRoughness": pbr}));
     assert_eq!(material.surface, Surface::Mirror);
     assert_eq!(material.base_color.to_array(), [1.0, 0.75, 0.25]);
-    assert!(!material.double_sided);
+    assert!(!material.back_emits);
 }
 
 #[test]

@@ -111,7 +111,7 @@ pub fn emitting(mut material: Value, radiance: [f64; 3]) -> Value {
     material
 }
 
-/// `material` without its back, which matters to emission alone.
+/// `material` whose back doesn't emit, and is hidden from cameras.
 pub fn one_sided(mut material: Value) -> Value {
     material["doubleSided"] = json!(false);
     material
