@@ -6,8 +6,9 @@ use std::path::Path;
 use anyhow::Result;
 use serde_json::json;
 
-use super::progress::{BUILDING, READING, while_showing};
+use super::progress::{BUILDING, while_showing};
 use super::render::default_resolution;
+use super::scene::SceneArguments;
 use crate::config::RenderConfig;
 use crate::gather::{METHODS, default_method};
 use crate::gpu;
@@ -61,8 +62,8 @@ pub fn gathers() -> Result<String> {
 }
 
 /// `ppm-vk inspect`.
-pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
-    let scene = while_showing(READING, false, || Scene::load(path))?;
+pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<String> {
+    let scene = read.load(path, false)?;
     let packed = while_showing(BUILDING, false, || PackedScene::new(&scene))
         .map_err(|what| crate::error::Error::scene(path, what))?;
     let memory = memory(&scene, &packed);
