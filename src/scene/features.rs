@@ -68,6 +68,8 @@ features! {
     textured: "TEXTURED",
     /// Surfaces that aren't there everywhere.
     alpha: "ALPHA",
+    /// Instances that share triangles.
+    instanced: "INSTANCED",
     /// A lens before the camera that is rendered.
     lens: "LENS",
 }

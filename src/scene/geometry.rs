@@ -158,7 +158,7 @@ pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut W
 }
 
 /// Finds render space from the bounds of all triangles that have an area.
-fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
+pub(super) fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
     let mut lower = DVec3::INFINITY;
     let mut upper = DVec3::NEG_INFINITY;
     for instance in instances {
