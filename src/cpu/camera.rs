@@ -41,7 +41,13 @@ struct Branch {
 }
 
 /// Radiance of the first surface on a ray's way, and whether nothing is there that scatters light.
-fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<PlacedTriangle>, medium: Option<u32>, random: &Random) -> (DVec3, bool) {
+fn glimpse(
+    inputs: &Inputs<'_>,
+    ray: Ray,
+    ignored: Option<PlacedTriangle>,
+    medium: Option<u32>,
+    random: &Random,
+) -> (DVec3, bool) {
     let Some(hit) = nearest_visible(inputs, ray, FAR, ignored, random) else {
         return (
             Environment::of(&inputs.scene.environment).at(ray.direction).radiance,

@@ -140,7 +140,11 @@ fn sample_direct(
         let (u, v) = triangle_point(u, v);
         let emitter = surface_at(inputs.scene, PlacedTriangle::unplaced(light.triangle), u, v);
         let direction = emitter.origin_towards(position - emitter.position) - origin;
-        if !is_free(direction, 1.0 - ENDS_BEFORE, Some(PlacedTriangle::unplaced(light.triangle))) {
+        if !is_free(
+            direction,
+            1.0 - ENDS_BEFORE,
+            Some(PlacedTriangle::unplaced(light.triangle)),
+        ) {
             return DVec3::ZERO;
         }
         emitter

@@ -161,7 +161,12 @@ impl<'a> Search<'a> {
                 }
                 continue;
             }
-            let [left, right] = children(&records[reference as usize], [origin + wider, origin - wider], inverse, self.limit);
+            let [left, right] = children(
+                &records[reference as usize],
+                [origin + wider, origin - wider],
+                inverse,
+                self.limit,
+            );
             let left_first = match (left, right) {
                 (Some((_, left)), Some((_, right))) => left <= right,
                 _ => true,

@@ -79,9 +79,13 @@ pub fn build(scene: &Scene, shared: &[Range<u32>], instances: &[Instance]) -> Re
     let placed = instances.par_iter().map(|Instance { shared, placement }| Placed {
         root: roots[*shared],
         placement: *placement,
-        bounds: bounds(built[*shared].0.triangles.iter().flat_map(|(_, corners)| {
-            corners.iter().map(|&corner| placement.point(corner))
-        })),
+        bounds: bounds(
+            built[*shared]
+                .0
+                .triangles
+                .iter()
+                .flat_map(|(_, corners)| corners.iter().map(|&corner| placement.point(corner))),
+        ),
     });
     let (items, tree) = Items::new(scene, own, placed.collect()).built();
     Packing::new(&mut bvh, &items, &tree, MOST_LEVELS - deepest, 0).pack(0);

@@ -38,7 +38,9 @@ pub(super) fn touched(
         .collect();
     touched.resize(triangles.len(), false);
     for instance in instances {
-        let placed = instances.iter().filter(|other| other.first_triangle == instance.first_triangle);
+        let placed = instances
+            .iter()
+            .filter(|other| other.first_triangle == instance.first_triangle);
         let is_first = placed.clone().next() == Some(instance);
         let (first, count) = (instance.first_triangle as usize, instance.triangle_count as usize);
         if !is_first || !is_dielectric(&triangles[first]) {

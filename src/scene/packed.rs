@@ -8,11 +8,12 @@ use glam::{DVec3, Vec3, Vec4};
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::object_grid::object_grids;
 use super::{
-    Alpha, Dielectric, Environment, Gloss, MaterialTextures, Scene, Surface, area, bvh, contact, environment, light_table,
+    Alpha, Dielectric, Environment, Gloss, MaterialTextures, Scene, Surface, area, bvh, contact, environment,
+    light_table,
 };
 use crate::layout::{
-    BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Instance, Light, MASK, Material, NO_LIGHT, NO_TEXTURE, OPAQUE,
-    ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED, TOUCHED, TRIANGLE_LIGHT, TextureLookup,
+    BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Instance, Light, MASK, Material, NO_LIGHT, NO_TEXTURE,
+    OPAQUE, ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED, TOUCHED, TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// What the ray stages read, in the order of the BVH's leaves.
@@ -75,10 +76,14 @@ impl PackedScene {
             let object = scene.triangles[index as usize].object;
             (index, scene.objects[object as usize].material)
         });
-        let shared = bvh.shared.iter().zip(shared_materials).flat_map(|(triangles, material)| {
-            let order = &bvh.order[triangles.start as usize..triangles.end as usize];
-            order.iter().map(move |&index| (index, material))
-        });
+        let shared = bvh
+            .shared
+            .iter()
+            .zip(shared_materials)
+            .flat_map(|(triangles, material)| {
+                let order = &bvh.order[triangles.start as usize..triangles.end as usize];
+                order.iter().map(move |&index| (index, material))
+            });
         let mut shading_triangles: Vec<_> = own
             .chain(shared)
             .zip(&corners)
@@ -175,7 +180,9 @@ fn shared_triangles(scene: &Scene) -> SharedTriangles {
 }
 
 fn instances(scene: &Scene, placed: &[bvh::Instance], shared: &[Range<u32>]) -> Vec<Instance> {
-    let objects = (0..).zip(&scene.objects).filter(|(_, object)| object.placement.is_some());
+    let objects = (0..)
+        .zip(&scene.objects)
+        .filter(|(_, object)| object.placement.is_some());
     let instance = |((object, _), placed): ((u32, _), &bvh::Instance)| {
         let triangles = &shared[placed.shared];
         Instance {
@@ -321,7 +328,10 @@ fn bsdf_sampling(scene: &Scene, lights: &[Light]) -> f32 {
         return 0.0;
     }
     let own = scene.own_triangles().map(|triangle| scene.corners_of(triangle));
-    let all: f64 = own.chain(scene.placed_triangles().map(|(_, corners)| corners)).map(area).sum();
+    let all: f64 = own
+        .chain(scene.placed_triangles().map(|(_, corners)| corners))
+        .map(area)
+        .sum();
     ((emissive / all + 0.5 * from_afar) as f32).clamp(0.05, 0.5)
 }
 

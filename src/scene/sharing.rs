@@ -47,7 +47,10 @@ impl Builder {
         };
         let unplaced = instance.unplaced();
         let known = self.shared.get(&instance.key());
-        let space = match known.map_or_else(|| normalise(root, std::slice::from_ref(&unplaced)), |shared| Ok(shared.space)) {
+        let space = match known.map_or_else(
+            || normalise(root, std::slice::from_ref(&unplaced)),
+            |shared| Ok(shared.space),
+        ) {
             Ok(space) => space,
             Err(_) => return Ok(None),
         };
