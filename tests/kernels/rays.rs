@@ -74,7 +74,7 @@ impl Probe {
         gpu.download(BufferId::ProbeTo, Some(rays.len())).expect("hits")
     }
 
-    /// How many of the rays that start in object 0, which is closed, meet something else or nothing, and one of them.
+    /// How many of the rays meet nothing, and one of them.
     fn leaks(&mut self, rays: impl Iterator<Item = Ray>) -> (usize, usize, Option<Ray>) {
         let (mut traced, mut leaked, mut first) = (0, 0, None);
         let mut rays = rays.peekable();
@@ -85,7 +85,7 @@ impl Probe {
                 traced += 1;
                 let missed = hit[3].to_bits() == u32::MAX;
                 assert!(missed || (hit[0] > 0.0 && hit[0].is_finite()), "{ray:?} meets {hit:?}");
-                if hit[3].to_bits() != 0 {
+                if missed {
                     leaked += 1;
                     first.get_or_insert(*ray);
                 }
