@@ -49,14 +49,27 @@ Corner corner_at(uint i) {
     return Corner(sets.xy, sets.zw, rest.xy, rest.z, uintBitsToFloat(rest.w));
 }
 
-Place place_at(uint triangle, vec2 uv) {
+Place place_at(PlacedTriangle at, vec2 uv) {
     Place place = Place(vec4(0.0), vec4(0.0), vec4(0.0));
+    bool is_placed = is_placed(at.instance);
+    Instance instance;
+    if (is_placed) {
+        instance = instance_at(at.instance);
+    }
     for (uint i = 0u; i < 3u; i++) {
-        Corner corner = corner_at(3u * triangle + i);
+        Corner corner = corner_at(3u * at.triangle + i);
         float weight = i == 0u ? 1.0 - uv.x - uv.y : (i == 1u ? uv.x : uv.y);
         place.sets += weight * vec4(corner.first, corner.second);
         place.color += weight * vec4(unpackHalf2x16(corner.color.x), unpackHalf2x16(corner.color.y));
-        place.tangent += weight * vec4(decode_direction(corner.tangent) * abs(corner.bitangent), corner.bitangent);
+        vec3 tangent = decode_direction(corner.tangent);
+        if (is_placed) {
+            // It follows the surface as its edges do. Mirroring turns normal × tangent round, but not the bitangent.
+            vec4 direction = vec4(tangent, 0.0);
+            tangent = normalize(vec3(dot(instance.rows[0], direction), dot(instance.rows[1], direction),
+                                     dot(instance.rows[2], direction)));
+            corner.bitangent *= instance.mirrored != 0u ? -1.0 : 1.0;
+        }
+        place.tangent += weight * vec4(tangent * abs(corner.bitangent), corner.bitangent);
     }
     return place;
 }

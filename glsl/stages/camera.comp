@@ -42,7 +42,7 @@ struct Branch {
     vec3 throughput;
     vec3 emitted;
     uint depth;
-    uint ignored;
+    PlacedTriangle ignored;
     uint medium;          // material that it is in, or VACUUM
     float wavelength;     // nm; 0: of all
     bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
@@ -63,7 +63,7 @@ struct Glimpse {
     bool dark; // nothing is there that scatters light
 };
 
-Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium, Random random) {
+Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, uint medium, Random random) {
     Hit hit = trace_visible(origin, direction, 1e30, ignored, false, random);
     if (loops_cut) {
         return Glimpse(vec3(0.0), true);
@@ -126,7 +126,7 @@ void main() {
     branch.throughput = vec3(1.0);
     branch.emitted = vec3(0.0);
     branch.depth = 0u;
-    branch.ignored = MISS;
+    branch.ignored = NO_TRIANGLE;
     branch.medium = VACUUM;
     branch.wavelength = 0.0;
     branch.reflection_seen = false;

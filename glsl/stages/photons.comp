@@ -44,7 +44,7 @@ struct Path {
     vec3 direction;
     vec3 flux;
     uint depth;
-    uint ignored;
+    PlacedTriangle ignored;
     uint medium; // material that it is in, or VACUUM
     float wavelength; // nm; 0: of all
     bool seen_directly; // no specular bounce since the light: direct light, which `direct` samples

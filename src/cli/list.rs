@@ -74,9 +74,12 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     let (low, high) = (to_world(low), to_world(high));
     if as_json {
         let value = json!({
-            "triangles": scene.triangles.len(),
+            "triangles": packed.seen_triangles(),
+            "stored_triangles": packed.shading_triangles.len(),
             "dropped_triangles": scene.dropped_triangles,
             "objects": scene.objects.len(),
+            "instances": packed.instances.len(),
+            "shared_primitives": packed.shared_primitives(),
             "materials": {
                 "matte": count(|s| matches!(s, Surface::Matte)),
                 "mirror": count(|s| matches!(s, Surface::Mirror)),
@@ -103,10 +106,19 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     writeln!(
         text,
         "triangles    {} ({} dropped)",
-        scene.triangles.len(),
+        packed.seen_triangles(),
         scene.dropped_triangles
     )?;
     writeln!(text, "objects      {}", scene.objects.len())?;
+    if packed.features.instanced {
+        writeln!(
+            text,
+            "instances    {} of {} shared primitives; {} triangles are stored",
+            packed.instances.len(),
+            packed.shared_primitives(),
+            packed.shading_triangles.len()
+        )?;
+    }
     writeln!(
         text,
         "materials    {} matte, {} mirror, {} dielectric, {} glossy",

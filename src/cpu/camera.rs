@@ -10,7 +10,7 @@ use super::contact::{Encounter, choose_part, is_mixed, transmittance};
 use super::dispersion::disperse;
 use super::environment::Environment;
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
-use super::intersect::Ray;
+use super::intersect::{PlacedTriangle, Ray};
 use super::light::{emits, emitted_radiance};
 use super::random::{PathKind, Random};
 use super::sampling::{disc_point, encode_direction};
@@ -29,7 +29,7 @@ struct Branch {
     throughput: DVec3,
     emitted: DVec3,
     depth: u32,
-    ignored: Option<u32>,
+    ignored: Option<PlacedTriangle>,
     /// Material that it is in.
     medium: Option<u32>,
     /// Of its light, nm.
@@ -41,7 +41,13 @@ struct Branch {
 }
 
 /// Radiance of the first surface on a ray's way, and whether nothing is there that scatters light.
-fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u32>, random: &Random) -> (DVec3, bool) {
+fn glimpse(
+    inputs: &Inputs<'_>,
+    ray: Ray,
+    ignored: Option<PlacedTriangle>,
+    medium: Option<u32>,
+    random: &Random,
+) -> (DVec3, bool) {
     let Some(hit) = nearest_visible(inputs, ray, FAR, ignored, random) else {
         return (
             Environment::of(&inputs.scene.environment).at(ray.direction).radiance,

@@ -40,7 +40,7 @@ pub use coverage::coverage;
 pub use direct::direct;
 pub use gather::{gather_kd_tree, gather_naive};
 pub use gloss::Reflector;
-pub use intersect::{Hit, Ray, is_blocked, nearest_hit};
+pub use intersect::{Hit, PlacedTriangle, Ray, is_blocked, nearest_hit};
 pub use photons::{Batch, compact, photons};
 pub use primitives::{scan, sort};
 pub use random::{PathKind, Random, pcg4d};

@@ -7,7 +7,7 @@ use super::contact::{Encounter, choose_part, transmittance};
 use super::dispersion::disperse;
 use super::emission::emit;
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
-use super::intersect::Ray;
+use super::intersect::{PlacedTriangle, Ray};
 use super::light::range_window;
 use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction};
@@ -51,7 +51,7 @@ pub fn compact(lanes: &[Vec<Photon>]) -> Vec<Photon> {
 struct Path {
     ray: Ray,
     flux: DVec3,
-    ignored: Option<u32>,
+    ignored: Option<PlacedTriangle>,
     /// Material that it is in.
     medium: Option<u32>,
     /// Of its light, nm.

@@ -3,11 +3,12 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::gloss::{COAT_F0, Reflector, coat_passes};
+use super::intersect::{Hit, PlacedTriangle};
 use super::sampling::decode_direction;
-use super::vector::{rgb, word, xyz};
+use super::vector::{rgb, word};
 use crate::layout::{Material, SMOOTH_SHADED, ShadingTriangle};
 use crate::scene::PackedScene;
 
@@ -23,12 +24,12 @@ pub(super) const GLOSSY: u32 = 3;
 /// A point of a triangle.
 #[derive(Clone, Copy)]
 pub(super) struct Surface {
-    /// Index of the triangle.
-    pub triangle: u32,
+    /// Which triangle.
+    pub triangle: PlacedTriangle,
     /// Barycentric coordinates of its second and third corner.
     pub uv: [f64; 2],
     pub position: DVec3,
-    /// Largest coordinates of the triangle's corners, without their signs.
+    /// Largest coordinates of the triangle's corners, or what those are sums of, without their signs.
     pub reach: DVec3,
     /// Unit vector on the triangle's front.
     pub geometric_normal: DVec3,
@@ -48,25 +49,42 @@ pub(super) struct Surface {
 }
 
 /// The point with the barycentric coordinates `u` and `v` of the second and the third corner.
-pub(super) fn surface_at(scene: &PackedScene, index: u32, u: f64, v: f64) -> Surface {
-    let triangle = &scene.shading_triangles[index as usize];
-    let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(xyz);
-    let geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
-    let shading_normal = interpolated_normal(triangle, u, v, geometric_normal);
+pub(super) fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64) -> Surface {
+    let triangle = &scene.shading_triangles[at.triangle as usize];
+    let [p0, p1, p2] = at.corners(scene);
+    let mut geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
+    let mut reach = p0.abs().max(p1.abs()).max(p2.abs());
+    let mut object = triangle.object;
+    let mut normal_matrix = None;
+    if let (Some(index), Some(placement)) = (at.instance, at.placement(scene)) {
+        if placement.is_mirrored() {
+            geometric_normal = -geometric_normal;
+        }
+        // So much the corners are uncertain by against those of other objects in the same place.
+        reach = placement.reach().as_dvec3();
+        object = scene.instances[index as usize].object;
+        normal_matrix = Some(placement.map().matrix3.inverse().transpose());
+    }
+    let shading_normal = interpolated_normal(triangle, u, v, geometric_normal, normal_matrix);
     Surface {
-        triangle: index,
+        triangle: at,
         uv: [u, v],
         position: p0 + u * (p1 - p0) + v * (p2 - p0),
-        reach: p0.abs().max(p1.abs()).max(p2.abs()),
+        reach,
         geometric_normal,
         shading_normal,
         coat_normal: shading_normal,
-        object: triangle.object,
+        object,
         material: scene.materials[triangle.material as usize],
         material_index: triangle.material,
         light: triangle.light,
         flags: triangle.flags,
     }
+}
+
+/// The point that a ray met.
+pub(super) fn surface_of(scene: &PackedScene, hit: Hit) -> Surface {
+    surface_at(scene, hit.at, hit.u, hit.v)
 }
 
 impl Surface {
@@ -78,11 +96,20 @@ impl Surface {
     }
 }
 
-fn interpolated_normal(triangle: &ShadingTriangle, u: f64, v: f64, geometric_normal: DVec3) -> DVec3 {
+fn interpolated_normal(
+    triangle: &ShadingTriangle,
+    u: f64,
+    v: f64,
+    geometric_normal: DVec3,
+    normal_matrix: Option<DMat3>,
+) -> DVec3 {
     if triangle.flags & SMOOTH_SHADED == 0 {
         return geometric_normal;
     }
-    let [n0, n1, n2] = [triangle.p0, triangle.p1, triangle.p2].map(|corner| decode_direction(word(corner)));
+    let [n0, n1, n2] = [triangle.p0, triangle.p1, triangle.p2].map(|corner| {
+        let normal = decode_direction(word(corner));
+        normal_matrix.map_or(normal, |matrix| (matrix * normal).normalize())
+    });
     let n = (1.0 - u - v) * n0 + u * n1 + v * n2;
     // Normals that cancel, or point to the back, say nothing.
     if n.length_squared() > 1e-12 && n.dot(geometric_normal) > 0.0 {

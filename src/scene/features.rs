@@ -74,6 +74,8 @@ features! {
     specular_glass: "SPECULAR_GLASS",
     /// Surfaces whose back no camera sees.
     culling: "CULLING",
+    /// Instances that share triangles.
+    instanced: "INSTANCED",
     /// A lens before the camera that is rendered.
     lens: "LENS",
 }

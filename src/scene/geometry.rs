@@ -158,20 +158,43 @@ pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut W
 }
 
 /// Finds render space from the bounds of all triangles that have an area.
-fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
+pub(super) fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
     let mut lower = DVec3::INFINITY;
     let mut upper = DVec3::NEG_INFINITY;
+    let mut repeated = HashMap::new();
     for instance in instances {
-        for triangle in 0..instance.primitive.triangle_count() {
-            let positions = instance
-                .triangle(triangle)
-                .map_err(|what| format!("{}: {what}", instance.label(root)))?
-                .positions;
-            if face_normal(positions).is_some() {
+        let mut extend = |positions: [DVec3; 3]| {
+            let is_inside = |corner: DVec3| corner.cmpge(lower).all() && corner.cmple(upper).all();
+            if !positions.iter().all(|&corner| is_inside(corner)) && face_normal(positions).is_some() {
                 for corner in positions {
                     lower = lower.min(corner);
                     upper = upper.max(corner);
                 }
+            }
+        };
+        let at_label = |what| format!("{}: {what}", instance.label(root));
+        let triangles = 0..instance.primitive.triangle_count();
+        let Some(to_world) = instance.node_alone().filter(|_| instance.is_repeated()) else {
+            for triangle in triangles {
+                extend(instance.triangle(triangle).map_err(at_label)?.positions);
+            }
+            continue;
+        };
+        // Read once, whatever the number of nodes.
+        let unplaced: &mut Vec<[DVec3; 3]> = match repeated.entry(instance.key()) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let unplaced = instance.unplaced();
+                let read = triangles.map(|triangle| Ok(unplaced.triangle(triangle)?.positions));
+                entry.insert(read.collect::<Check<_>>().map_err(at_label)?)
+            }
+        };
+        for (triangle, positions) in unplaced.iter().enumerate() {
+            let positions = positions.map(|corner| to_world.transform_point3(corner));
+            if positions.iter().all(|corner| corner.is_finite()) {
+                extend(positions);
+            } else {
+                instance.triangle(triangle).map_err(at_label)?;
             }
         }
     }

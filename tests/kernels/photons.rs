@@ -114,6 +114,12 @@ fn photons_in_a_scene_of_textures_land_where_the_cpus_do() {
 }
 
 #[test]
+fn photons_among_instances_land_where_the_cpus_do() {
+    // The studs' normals are steep: they make more of what rounding makes of a place.
+    assert_photons_agree("instances", photons_carry_all_light(), 1e-4, 0.98, 7000);
+}
+
+#[test]
 fn photons_of_every_kind_of_light_land_where_the_cpus_do() {
     for name in ["cornell-spheres, lit", "ring, lit", "glasses, lit"] {
         // Many of the environment's meet nothing.

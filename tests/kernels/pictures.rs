@@ -60,6 +60,7 @@ fn both_backends_render_the_same_picture() {
         ("coats", Estimator::Ppm, Direct::Photons),
         ("textures", Estimator::Sppm, Direct::Light),
         ("textures", Estimator::Ppm, Direct::Photons),
+        ("instances", Estimator::Sppm, Direct::Light),
         ("glossy, lit", Estimator::Sppm, Direct::Light),
         ("ring, lit", Estimator::Ppm, Direct::Photons),
     ] {

@@ -83,6 +83,7 @@ fn camera_paths_end_where_the_cpus_end() {
         "glasses",
         "coats",
         "textures",
+        "instances",
         "ring, lit",
         "glasses, lit",
     ] {
@@ -123,6 +124,7 @@ fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
         ("GLOSSY", u32::from(bench.scene.features.glossy)),
         ("PUNCTUAL_LIGHTS", u32::from(bench.scene.features.punctual)),
         ("ENVIRONMENT", u32::from(bench.scene.features.environment)),
+        ("INSTANCED", u32::from(bench.scene.features.instanced)),
     ];
     recording.dispatch(
         StageDesc::new(&shaders::DIRECT, slots)
@@ -165,6 +167,7 @@ fn direct_light_agrees_at_the_same_visible_points() {
         ("ring", 2000),
         ("furnace-closed", 4000),
         ("glossy", 2500),
+        ("instances", 2000),
         ("ring, lit", 2000),
         ("glossy, lit", 1000),
     ] {

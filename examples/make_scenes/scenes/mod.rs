@@ -7,7 +7,7 @@ mod spheres;
 use document::{
     Document, File, Filter, clear, emitting, light, matte, metallic_roughness, mirror, one_sided, png, with_texture,
 };
-use glam::{DVec3, dvec3};
+use glam::{DVec3, dvec2, dvec3};
 use mesh::Mesh;
 use serde_json::json;
 use std::f64::consts::FRAC_PI_2;
@@ -26,6 +26,7 @@ pub fn all() -> Vec<File> {
         spheres::glasses(),
         spheres::coats(),
         textures(),
+        instances(),
         ring(),
         pool("pool", false),
         pool("pool-tiles", true),
@@ -127,7 +128,7 @@ fn tile_png() -> Vec<u8> {
     })
 }
 
-/// Normals of a stud, 32 × 32 texels.
+/// Normals of a round stud.
 fn stud_png() -> Vec<u8> {
     png(32, 32, |x, y| {
         let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
@@ -137,6 +138,55 @@ fn stud_png() -> Vec<u8> {
         let [r, g, b] = normal.map(|value| (127.5 + 127.5 * value).round() as u8);
         [r, g, b, 255]
     })
+}
+
+/// The same room with a few meshes that many nodes show: turned, stretched, mirrored, in turned and stretched groups; glass
+/// that stands on the floor, and one in the other.
+fn instances() -> Document {
+    const UP: [f64; 3] = [0.0, 1.0, 0.0];
+    let tilted = DVec3::new(1.0, 2.0, 2.0).normalize().to_array();
+    let mut scene = cornell_room("instances");
+    let studs = scene.texture(&stud_png(), Filter::Linear);
+    let tiles = scene.texture(&tile_png(), Filter::Nearest);
+    let studded = metallic_roughness("studded", [0.9, 0.7, 0.5], 0.0, 0.4);
+    let studded = with_texture(studded, "/normalTexture", studs);
+    let studded = scene.material(with_texture(studded, "/pbrMetallicRoughness/baseColorTexture", tiles));
+    let mut ball = Mesh::icosphere(0.25, 2);
+    let place = |p: &DVec3| dvec2(2.0 * p.x.atan2(p.z), 4.0 * p.y) * 2.0;
+    ball.texcoords = ball.positions.iter().map(place).collect();
+    scene.object("ball", &ball, studded).at([-0.6, 1.0, -0.5]);
+    let ball = scene.last_mesh();
+    let mut mirrored = scene.again("mirrored", ball);
+    mirrored
+        .at([0.0, 1.1, -0.6])
+        .rotated(tilted, 0.7)
+        .scaled([-1.0, 1.0, 1.0]);
+    let mut egg = scene.again("egg", ball);
+    egg.at([0.6, 1.0, -0.5]).rotated(tilted, 2.0).scaled([0.7, 1.5, 0.9]);
+    scene.again("left", ball).at([-0.4, 0.0, 0.0]).rotated(tilted, 1.0);
+    scene.again("right", ball).at([0.4, 0.0, 0.0]).scaled([0.8, -0.8, 0.8]);
+    let mut pair = scene.group("pair", 2);
+    pair.at([0.0, 0.4, -0.2]).rotated(UP, 0.3).scaled([1.2, 0.6, 0.8]);
+
+    let white = scene.material(matte("hoop", WHITE));
+    scene.object("hoop", &Mesh::ring(0.2, 0.24, -0.04, 0.04, 24), white);
+    let hoop = scene.last_mesh();
+    scene
+        .again("smaller", hoop)
+        .rotated([0.0, 0.0, 1.0], 1.2)
+        .scaled([0.7, 0.7, 0.7]);
+    let mut hoops = scene.group("hoops", 2);
+    hoops.at([0.1, 0.3, 0.5]).rotated([1.0, 0.0, 0.0], 0.9);
+
+    let glass = scene.material(clear("glass", 1.5));
+    scene
+        .object("glass", &Mesh::ring(0.12, 0.25, 0.0, 0.16, 20), glass)
+        .at([-0.55, 0.0, 0.5]);
+    let glass = scene.last_mesh();
+    let mut other = scene.again("other glass", glass);
+    other.at([0.6, 0.0, 0.5]).rotated(UP, 0.5).scaled([1.0, 1.5, 0.7]);
+    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
+    scene
 }
 
 /// The same room with a checkered floor, a wall of studs, a fence, a pane of smoke, a ball of metal and plaster, and a lamp of
