@@ -34,6 +34,7 @@ pub fn all() -> Vec<File> {
         furnace_closed(),
         light_area(),
         lights(),
+        plaza(),
         slab(),
     ]
     .into_iter()
@@ -195,17 +196,7 @@ fn textures() -> Document {
         }),
         Filter::Nearest,
     );
-    let studs = scene.texture(
-        &png(32, 32, |x, y| {
-            let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
-            let (x, y) = (at(x), -at(y));
-            let z = (1.0 - x * x - y * y).max(0.0).sqrt();
-            let normal = if z > 0.5 { [x, y, z] } else { [0.0, 0.0, 1.0] };
-            let [r, g, b] = normal.map(|value| (127.5 + 127.5 * value).round() as u8);
-            [r, g, b, 255]
-        }),
-        Filter::Linear,
-    );
+    let studs = scene.texture(&studs_png(), Filter::Linear);
     let fence = scene.texture(
         &png(8, 8, |x, y| [120, 90, 50, if x % 4 == 0 || y == 4 { 255 } else { 0 }]),
         Filter::Nearest,
@@ -266,6 +257,18 @@ fn textures() -> Document {
     scene.object("glow", &panel(0.0, 0.0, 0.2), glow).at([0.0, 0.05, -0.6]);
     scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
     scene
+}
+
+/// The normals of half a sphere on a plane, 32 × 32 texels.
+fn studs_png() -> Vec<u8> {
+    png(32, 32, |x, y| {
+        let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
+        let (x, y) = (at(x), -at(y));
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+        let normal = if z > 0.5 { [x, y, z] } else { [0.0, 0.0, 1.0] };
+        let [r, g, b] = normal.map(|value| (127.5 + 127.5 * value).round() as u8);
+        [r, g, b, 255]
+    })
 }
 
 /// A grey sphere in a box of radiance 1.
@@ -334,6 +337,55 @@ fn lights() -> Document {
     let sun = json!({ "name": "sun", "type": "directional", "intensity": 0.7 });
     scene.punctual(sun).rotated([1.0, 0.0, 0.0], 0.6 * down);
     scene.camera([1.8, 3.2], [0.3, 0.0], 35.0);
+    scene
+}
+
+/// Things under punctual lights, seen without perspective: enamel with a coloured reflection, an alloy, polished metal, a studded
+/// column, a thin frosted pane, ground with colours at its corners. Nothing there is smooth: a path tracer finds all light.
+fn plaza() -> Document {
+    let mut scene = Document::new("plaza");
+    let ground = scene.material(matte("ground", [0.8; 3]));
+    let color = |x: f64, z: f64| dvec3(0.5 + 0.4 * (2.0 * x).sin(), 0.5 + 0.4 * (2.0 * z).cos(), 0.4);
+    scene.object("ground", &Mesh::colored(2.0, 16, color), ground);
+    let mut enamel = metallic_roughness("enamel", [0.5, 0.5, 0.6], 0.0, 0.4);
+    enamel["extensions"] = json!({
+        "KHR_materials_ior": { "ior": 2.2 },
+        "KHR_materials_specular": { "specularFactor": 0.9, "specularColorFactor": [2.5, 0.8, 0.2] },
+    });
+    let sphere = Mesh::icosphere(0.4, 4);
+    let polished = metallic_roughness("polished", [0.95, 0.8, 0.5], 1.0, 0.25);
+    let alloy = metallic_roughness("alloy", [0.3, 0.5, 0.8], 0.5, 0.4);
+    for (material, [x, z]) in [(enamel, [-1.1, 0.5]), (polished, [0.0, 0.9]), (alloy, [1.1, 0.5])] {
+        let material = scene.material(material);
+        scene.object("sphere", &sphere, material).at([x, 0.4005, z]);
+    }
+    let studs = scene.texture(&studs_png(), Filter::Linear);
+    let studded = metallic_roughness("studded", [0.8, 0.7, 0.6], 0.0, 0.5);
+    let mut studded = with_texture(studded, "/normalTexture", studs);
+    studded["normalTexture"]["extensions"] =
+        json!({ "KHR_texture_transform": { "scale": [1.0, 2.0], "offset": [0.1, 0.2], "rotation": 0.3 } });
+    let studded = scene.material(studded);
+    let column = Mesh::column(0.5, 1.5, 24, 6.0);
+    scene.object("column", &column, studded).at([-0.5, 0.001, -0.7]);
+    let mut pane = glass("pane", 0.4, 0.8, None);
+    pane["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.9, 0.6, 0.3, 1.0]);
+    let pane = scene.material(pane);
+    let square = [[-0.5, 0.0], [0.5, 0.0], [0.5, 1.2], [-0.5, 1.2]].map(|[x, y]| dvec3(x, y, 0.0));
+    scene
+        .object("pane", &Mesh::quad(square), pane)
+        .at([0.9, 0.002, -0.5])
+        .rotated([0.0, 1.0, 0.0], -0.5);
+    let lamp = json!({ "name": "lamp", "type": "point", "color": [1.0, 0.7, 0.4], "intensity": 4.0, "range": 3.0 });
+    scene.punctual(lamp).at([0.6, 1.4, 1.4]);
+    let cone = json!({ "innerConeAngle": 0.2, "outerConeAngle": 0.6 });
+    let spot = json!({ "name": "spot", "type": "spot", "color": [0.5, 0.8, 1.0], "intensity": 20.0, "spot": cone });
+    let down = -FRAC_PI_2;
+    scene.punctual(spot).at([-0.8, 2.5, 0.4]).rotated([1.0, 0.0, 0.0], down);
+    let sun = json!({ "name": "sun", "type": "directional", "intensity": 1.2 });
+    scene
+        .punctual(sun)
+        .rotated(dvec3(-1.0, 0.8, 0.0).normalize().to_array(), 0.8);
+    scene.parallel_camera([2.5, 4.0], [0.5, 0.0], 1.7);
     scene
 }
 
