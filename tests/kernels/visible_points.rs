@@ -81,11 +81,13 @@ fn camera_paths_end_where_the_cpus_end() {
     ] {
         assert_camera_agrees(name, small(), 3000);
     }
+    // A third of the picture is the void.
+    assert_camera_agrees("plaza", small(), 2000);
 }
 
 #[test]
 fn camera_paths_that_split_at_glass_fill_the_same_slots() {
-    for (name, least_seen) in [("cornell-spheres", 4000), ("pool", 3000)] {
+    for (name, least_seen) in [("cornell-spheres", 4000), ("pool", 3000), ("plaza", 1000)] {
         // Of an odd height: rays through the pixels' centres meet the very edges of the symmetric room otherwise.
         let config = RenderConfig {
             estimator: Estimator::Ppm,
