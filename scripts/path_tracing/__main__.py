@@ -21,6 +21,7 @@ def main():
         if not arguments.environment and not lights and not any(mesh.material.has_emission() for mesh in meshes):
             notes.append("it has no light, and gets an environment of radiance 1")
             arguments.environment = (1.0, 1.0, 1.0)
+        notes += lost_light(meshes, lights, arguments.light_tracing)
         if not arguments.output.parent.is_dir():
             raise gltf.Unsupported(f"there is no folder {arguments.output.parent} for the picture")
     except gltf.Unsupported as error:
@@ -33,6 +34,16 @@ def main():
         print(f"reference: {arguments.scene}: {note}", file=sys.stderr)
     resolution = arguments.resolution or (256, max(1, round(256 / (camera.aspect or 1))))
     render(arguments, (meshes, camera, lights, arguments.environment), resolution)
+
+
+def lost_light(meshes, lights, is_light_tracing):
+    """What no path from the camera finds: light without extent by way of what is smooth."""
+    specular = sorted({mesh.material.name for mesh in meshes if mesh.material.is_specular()})
+    if not lights or not specular:
+        return []
+    where = "where it is seen by mirrors or glass" if is_light_tracing else "(--light-tracing finds some of it)"
+    names = ", ".join(f"«{name}»" for name in specular)
+    return [f"what {names} make of the punctual lights is missing {where}"]
 
 
 def render(arguments, world, resolution):

@@ -64,9 +64,9 @@ class Material:
         return self.is_clear() and not self.is_thin
 
     def is_specular(self):
-        """Whether it has a boundary that mirrors or refracts."""
+        """Whether it has a smooth boundary: light reaches it from one direction alone."""
         is_glossy = self.metallic > 0 or self.specular > 0 and self.ior != 1
-        return self.is_clear() or is_glossy and self.is_smooth()
+        return self.is_smooth() and (self.is_clear() or is_glossy)
 
     def is_matte(self):
         return not self.is_clear() and self.metallic == 0 and self.specular == 0

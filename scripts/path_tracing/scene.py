@@ -206,7 +206,7 @@ def build(meshes, camera, lights, environment, resolution, has_specular=True, is
             shape["bsdf"] = BLACK if material.is_specular() and not has_specular else bsdf(look)
             if material.has_emission():
                 shape["emitter"] = {"type": "lamp", "look": look.number, **aim}
-            has_media |= look.is_see_through()
+            has_media |= look.is_see_through() or (material.is_clear() and material.is_thin and material.is_smooth())
             if material.is_solid() and max(material.absorption) > 0:
                 has_media = True
                 most = max(material.absorption)
