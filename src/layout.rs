@@ -306,9 +306,10 @@ device_structs! {
     pub struct Gloss: 32 {
         /// rgb: albedo under the reflecting boundary; w: u32 bits, octahedral direction to the viewer.
         pub diffuse_viewer: [f32; 4],
-        /// rgb: reflectance of the boundary at normal incidence; w: u32 bits, two f16, at grazing incidence and GGX's α, 0
-        /// where the path followed the reflection itself.
-        pub f0_f90_alpha: [f32; 4],
+        /// rgb: reflectance of the boundary at normal incidence; w: u32 bits. Lower half an f16, GGX's α, 0 where the path
+        /// followed the reflection itself; then two bytes, of 254 steps: the part that is metal, and the rest's
+        /// reflectance at grazing incidence.
+        pub f0_rest: [f32; 4],
     }
 
     /// A photon.

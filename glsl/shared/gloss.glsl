@@ -9,36 +9,68 @@ const float SMOOTH_ALPHA = 1e-3;
 // Below this α camera paths follow reflections; photons gathered on such a narrow lobe would be noise.
 const float FOLLOWED_ALPHA = 0.1;
 
+// In which a byte has a part from 0 to 1: a half is one of them.
+const float PART_STEPS = 254.0;
+
 struct Reflector {
-    vec3 diffuse; // albedo of the base
-    vec3 f0;      // reflectance of the boundary at normal and at grazing incidence
+    vec3 diffuse;    // albedo of the base
+    vec3 f0;         // reflectance of the boundary at normal and at grazing incidence
     float f90;
     float alpha;
+    float metallic;  // part that is metal and has no base
+    vec2 over_base;  // largest channel of what reflects over the base, at normal and at grazing incidence
 };
+
+const Reflector NO_REFLECTOR = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, vec2(0.0));
+
+float largest_channel(vec3 v) {
+    return max(v.x, max(v.y, v.z));
+}
+
+// specular: reflectance at grazing incidence of the part that isn't metal.
+Reflector make_reflector(vec3 diffuse, vec3 f0, float specular, float metallic, float alpha) {
+    // f0 is a mixture of the metal's colour, of which `diffuse` is what isn't metal, and of what is wanted.
+    float rest = max(1.0 - metallic, 1e-3);
+    float over_base = max(largest_channel(f0 - diffuse * (metallic / rest)) / rest, 0.0);
+    return Reflector(diffuse, f0, mix(specular, 1.0, metallic), alpha, metallic, vec2(over_base, specular));
+}
 
 // How a visible point's surface scatters.
 struct Gloss {
     vec4 diffuse_viewer; // w: uint bits, octahedral v
-    vec4 f0_f90_alpha;   // w: uint bits, two f16: f90 and α, α = 0 where the path followed the reflection itself
+    // w: uint bits. Lower half an f16, α, 0 where the path followed the reflection itself; then two bytes, of PART_STEPS:
+    // `metallic` and `specular` of make_reflector.
+    vec4 f0_rest;
 };
 
 #define GLOSS(i) Gloss(TEXEL(GlossOf, 2u * (i)), TEXEL(GlossOf, 2u * (i) + 1u))
 
 Reflector reflector_of(Gloss gloss) {
-    vec2 rest = unpackHalf2x16(floatBitsToUint(gloss.f0_f90_alpha.w));
-    return Reflector(gloss.diffuse_viewer.rgb, gloss.f0_f90_alpha.rgb, rest.x, rest.y);
+    uint rest = floatBitsToUint(gloss.f0_rest.w);
+    vec2 parts = vec2(rest >> 16u & 0xffu, rest >> 24u) * (1.0 / PART_STEPS);
+    return make_reflector(gloss.diffuse_viewer.rgb, gloss.f0_rest.rgb, parts.y, parts.x, unpackHalf2x16(rest).x);
 }
 
 Gloss gloss_of(Reflector reflector, vec3 v) {
-    uint rest = packHalf2x16(vec2(reflector.f90, reflector.alpha));
+    uvec2 parts = uvec2(vec2(reflector.metallic, reflector.over_base.y) * PART_STEPS + 0.5);
+    uint rest = packHalf2x16(vec2(reflector.alpha, 0.0)) | parts.x << 16u | parts.y << 24u;
     return Gloss(vec4(reflector.diffuse, uintBitsToFloat(encode_direction(v))),
                  vec4(reflector.f0, uintBitsToFloat(rest)));
 }
 
-vec3 fresnel(Reflector reflector, float cosine) {
+float schlick_weight(float cosine) {
     float m = clamp(1.0 - cosine, 0.0, 1.0);
     float m2 = m * m;
-    return reflector.f0 + (reflector.f90 - reflector.f0) * (m2 * m2 * m);
+    return m2 * m2 * m;
+}
+
+vec3 fresnel(Reflector reflector, float cosine) {
+    return reflector.f0 + (reflector.f90 - reflector.f0) * schlick_weight(cosine);
+}
+
+// What gets through to the base, alike for all colours (KHR_materials_specular), and past what isn't metal alone.
+float through_to_base(Reflector reflector, float cosine) {
+    return 1.0 - mix(reflector.over_base.x, reflector.over_base.y, schlick_weight(cosine));
 }
 
 // Density of microfacet normals. The sine comes from the cross product: 1 − cos² of a small angle is rounding.
@@ -67,11 +99,13 @@ vec3 brdf(Reflector reflector, vec3 n, vec3 v, vec3 l) {
     float nv = dot(n, v);
     float nl = dot(n, l);
     vec3 h = normalize(v + l);
-    vec3 f = fresnel(reflector, dot(v, h));
+    float cosine = dot(v, h);
+    vec3 f = fresnel(reflector, cosine);
+    float through = through_to_base(reflector, cosine);
     float alpha = max(reflector.alpha, SMOOTH_ALPHA);
     float visibility = 0.5 / (nl * masking_root(alpha, nv) + nv * masking_root(alpha, nl));
     float lobe = reflector.alpha < SMOOTH_ALPHA ? 0.0 : ggx(alpha, n, h) * visibility;
-    return nv > 0.0 && nl > 0.0 ? (1.0 - f) * reflector.diffuse * (1.0 / PI) + f * lobe : vec3(0.0);
+    return nv > 0.0 && nl > 0.0 ? through * reflector.diffuse * (1.0 / PI) + f * lobe : vec3(0.0);
 }
 
 // Share of the samples that go to the boundary's reflection: at least a quarter, for what it mirrors may be bright.

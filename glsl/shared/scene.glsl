@@ -151,9 +151,9 @@ bool is_matte(Material material) {
 }
 
 Reflector reflector_of(Material material) {
-    return Reflector(material.base_color * (1.0 - material.metallic),
-                     mix(material.specular_f0, material.base_color, material.metallic),
-                     mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness);
+    return make_reflector(material.base_color * (1.0 - material.metallic),
+                          mix(material.specular_f0, material.base_color, material.metallic), material.specular_f90,
+                          material.metallic, material.roughness * material.roughness);
 }
 
 struct Hit {

@@ -183,7 +183,8 @@ void main() {
             }
             branch.emission_seen = false;
             // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
-            Reflector reflector = Reflector(material.base_color, vec3(0.0), 0.0, 0.0);
+            Reflector reflector = NO_REFLECTOR;
+            reflector.diffuse = material.base_color;
             if (is_mixed(material)) {
                 u = next4(random);
                 choose_part(material, u.x);

@@ -225,7 +225,7 @@ class Meeting:
         self.ior = look.material.ior
 
     def fresnel(self, cosine):
-        """Reflectances: of the boundary, of its dielectric part alone, and of the clear part."""
+        """Of the boundary, of the clear part; and between them what gets through to the base."""
         values = self.values
         of_dielectric = schlick(values.f0, mi.Color3f(values.f90), cosine)
         of_metal = schlick(values.base, mi.Color3f(1), cosine)
@@ -233,7 +233,9 @@ class Meeting:
         opaque = dr.maximum(1 - self.clear, 1e-6)
         metallic = dr.minimum(values.metallic / opaque, 1)
         mixed = dr.lerp(of_dielectric, of_metal, metallic)
-        return opaque * mixed + self.clear * of_clear, (1 - metallic) * opaque * (1 - mixed), of_clear
+        # The largest channel is what lies over the base, for all of them: KHR_materials_specular.
+        base = (1 - metallic) * opaque * (1 - dr.max(of_dielectric))
+        return opaque * mixed + self.clear * of_clear, base, of_clear
 
     def lobes(self, l):
         """BSDF times cosine of a direction in the frame, what is smooth left out."""
@@ -260,7 +262,7 @@ class Meeting:
         """Of reflecting at the boundary, of scattering in the base, of passing."""
         reflectance, base, of_clear = self.fresnel(self.v.z)
         reflects = dr.max(reflectance)
-        scatters = dr.max(base * self.values.base)
+        scatters = base * dr.max(self.values.base)
         passes = dr.max(self.values.base) * self.clear * (1 - of_clear)
         reflects = dr.select(reflects > 0, dr.maximum(reflects, 0.25 * (reflects + scatters + passes)), 0)
         total = dr.maximum(reflects + scatters + passes, 1e-20)

@@ -14,6 +14,13 @@ pub const SMOOTH_ALPHA: f64 = 1e-3;
 /// Below this α camera paths follow reflections.
 pub(super) const FOLLOWED_ALPHA: f64 = 0.1;
 
+/// In which a byte has a part from 0 to 1: a half is one of them.
+const PART_STEPS: f64 = 254.0;
+
+fn schlick_weight(cosine: f64) -> f64 {
+    (1.0 - cosine).clamp(0.0, 1.0).powi(5)
+}
+
 /// A Lambertian base under a boundary of microfacets. `v` and `l` are unit vectors to the viewer and to the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reflector {
@@ -21,8 +28,10 @@ pub struct Reflector {
     pub diffuse: DVec3,
     /// Reflectance of the boundary at normal incidence.
     pub f0: DVec3,
-    /// At grazing incidence.
-    pub f90: f64,
+    /// At grazing incidence, of the part that isn't metal; metal has 1.
+    pub specular: f64,
+    /// Part that is metal and has no base.
+    pub metallic: f64,
     /// GGX's α.
     pub alpha: f64,
 }
@@ -34,7 +43,8 @@ impl Reflector {
         Self {
             diffuse: base * (1.0 - metallic),
             f0: rgb(material.specular_f0).lerp(base, metallic),
-            f90: f64::from(material.specular_f90) * (1.0 - metallic) + metallic,
+            specular: material.specular_f90.into(),
+            metallic,
             alpha: f64::from(material.roughness).powi(2),
         }
     }
@@ -44,7 +54,8 @@ impl Reflector {
         Self {
             diffuse: albedo,
             f0: DVec3::ZERO,
-            f90: 0.0,
+            specular: 0.0,
+            metallic: 0.0,
             alpha: 0.0,
         }
     }
@@ -56,29 +67,40 @@ impl Reflector {
 
     /// What a visible point keeps, and the direction to the viewer.
     pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
-        let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
-        let rest = word(gloss.f0_f90_alpha);
+        let rest = word(gloss.f0_rest);
+        let [.., metallic, specular] = rest.to_le_bytes();
         let reflector = Self {
             diffuse: xyz(gloss.diffuse_viewer),
-            f0: xyz(gloss.f0_f90_alpha),
-            f90: half(rest),
-            alpha: half(rest >> 16),
+            f0: xyz(gloss.f0_rest),
+            specular: f64::from(specular) / PART_STEPS,
+            metallic: f64::from(metallic) / PART_STEPS,
+            alpha: f16::from_bits(rest as u16).to_f64(),
         };
         (reflector, decode_direction(word(gloss.diffuse_viewer)))
     }
 
     pub(super) fn to_gloss(self, v: DVec3) -> Gloss {
-        let half = |value: f64| u32::from(f16::from_f64(value).to_bits());
-        let rest = half(self.f90) | half(self.alpha) << 16;
+        let [low, high] = f16::from_f64(self.alpha).to_bits().to_le_bytes();
+        let [metallic, specular] = [self.metallic, self.specular].map(|part| (part * PART_STEPS + 0.5) as u8);
         Gloss {
             diffuse_viewer: with_word(self.diffuse, encode_direction(v)),
-            f0_f90_alpha: with_word(self.f0, rest),
+            f0_rest: with_word(self.f0, u32::from_le_bytes([low, high, metallic, specular])),
         }
     }
 
     /// Reflectance of the boundary.
     pub fn fresnel(&self, cosine: f64) -> DVec3 {
-        self.f0 + (DVec3::splat(self.f90) - self.f0) * (1.0 - cosine).clamp(0.0, 1.0).powi(5)
+        let f90 = self.specular + (1.0 - self.specular) * self.metallic;
+        self.f0 + (DVec3::splat(f90) - self.f0) * schlick_weight(cosine)
+    }
+
+    /// What gets through to the base, alike for all colours (`KHR_materials_specular`), and past what isn't metal alone.
+    fn through_to_base(&self, cosine: f64) -> f64 {
+        // f0 is a mixture of the metal's colour, of which `diffuse` is what isn't metal, and of what is wanted.
+        let rest = (1.0 - self.metallic).max(1e-3);
+        let over_base = (self.f0 - self.diffuse * (self.metallic / rest)).max_element() / rest;
+        let over_base = over_base.max(0.0);
+        1.0 - (over_base + (self.specular - over_base) * schlick_weight(cosine))
     }
 
     pub(super) fn is_smooth(&self) -> bool {
@@ -103,7 +125,7 @@ impl Reflector {
         }
         let h = (v + l).normalize();
         let f = self.fresnel(v.dot(h));
-        let base = (1.0 - f) * self.diffuse / PI;
+        let base = self.through_to_base(v.dot(h)) * self.diffuse / PI;
         if self.is_smooth() {
             return base;
         }

@@ -24,8 +24,8 @@ fn angle(a: f32, b: f32) -> f64 {
 fn same_gloss(found: &Gloss, expected: &Gloss) -> bool {
     let near = |a: [f32; 4], b: [f32; 4]| xyz(a).distance(xyz(b)) <= 1e-6;
     near(found.diffuse_viewer, expected.diffuse_viewer)
-        && near(found.f0_f90_alpha, expected.f0_f90_alpha)
-        && found.f0_f90_alpha[3].to_bits() == expected.f0_f90_alpha[3].to_bits()
+        && near(found.f0_rest, expected.f0_rest)
+        && found.f0_rest[3].to_bits() == expected.f0_rest[3].to_bits()
         && angle(found.diffuse_viewer[3], expected.diffuse_viewer[3]) < 1.5e-4
 }
 

@@ -146,7 +146,8 @@ fn a_surface_that_is_half_clear_scatters_the_other_half() {
     let lacquer = Reflector {
         diffuse: DVec3::splat(0.9),
         f0: DVec3::splat(0.04),
-        f90: 1.0,
+        specular: 1.0,
+        metallic: 0.0,
         alpha: 0.0,
     };
     for direct in [Direct::Light, Direct::Photons] {
