@@ -350,10 +350,10 @@ device_structs! {
     pub struct Gloss: 32 {
         /// rgb: albedo under the reflecting boundary; w: u32 bits, octahedral direction to the viewer.
         pub diffuse_viewer: [f32; 4],
-        /// rgb: reflectance of the boundary at normal incidence; w: u32 bits, the root of GGX's α in 4095ths, 0 where the path
-        /// followed the reflection itself, and above its 12 bits, in 1023rds of 10 bits each, the reflectance at grazing
-        /// incidence and how much of a coat there is.
-        pub f0_rest: [f32; 4],
+        /// f16s, two to a word: reflectance of the boundary at normal incidence, linear RGB, and at grazing incidence; GGX's α, 0
+        /// where the path followed the reflection itself; how much of a coat there is; the largest channel of what lies over
+        /// the base at both angles.
+        pub rest: [u32; 4],
     }
 
     /// A photon.

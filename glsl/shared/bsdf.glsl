@@ -167,7 +167,3 @@ Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float ou
     }
     return boundary;
 }
-
-float largest(vec3 v) {
-    return max(v.x, max(v.y, v.z));
-}

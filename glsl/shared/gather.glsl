@@ -23,7 +23,7 @@ struct Receiver {
 };
 
 const Receiver NO_RECEIVER = Receiver(vec3(0.0), -1.0, NO_OBJECT, vec3(0.0), vec3(0.0), vec3(0.0),
-                                      Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0));
+                                      NO_REFLECTOR);
 
 Receiver receiver_at(uint slot) {
     vec4 position_object = TEXEL(VisiblePoints, 3u * slot);

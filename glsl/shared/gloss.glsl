@@ -10,34 +10,35 @@ const float SMOOTH_ALPHA = 1e-3;
 const float FOLLOWED_ALPHA = 0.1;
 
 struct Reflector {
-    vec3 diffuse; // albedo of the base
-    vec3 f0;      // reflectance of the boundary at normal and at grazing incidence
+    vec3 diffuse;   // albedo of the base
+    vec3 f0;        // reflectance of the boundary at normal and at grazing incidence
     float f90;
     float alpha;
-    float coat; // what lies above both, see KHR_materials_clearcoat: how much of a dielectric's reflection it has
+    vec2 over_base; // largest channel of what reflects over the base, at normal and at grazing incidence
+    float coat;     // what lies above both, see KHR_materials_clearcoat: how much of a dielectric's reflection it has
 };
+
+const Reflector NO_REFLECTOR = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0, vec2(0.0), 0.0);
 
 // How a visible point's surface scatters.
 struct Gloss {
     vec4 diffuse_viewer; // w: uint bits, octahedral v
-    vec4 f0_rest;        // w: uint bits, √α · 4095, f90 · 1023 << 12 and coat · 1023 << 22; α = 0 where the path
-                         // followed the reflection itself
+    uvec4 rest;          // f16s: f0, f90, α, coat, over_base; α = 0 where the path followed the reflection itself
 };
 
-#define GLOSS(i) Gloss(TEXEL(GlossOf, 2u * (i)), TEXEL(GlossOf, 2u * (i) + 1u))
+#define GLOSS(i) Gloss(TEXEL(GlossOf, 2u * (i)), TEXEL_BITS(GlossOf, 2u * (i) + 1u))
 
 Reflector reflector_of(Gloss gloss) {
-    uint rest = floatBitsToUint(gloss.f0_rest.w);
-    float roughness = float(rest & 4095u) * (1.0 / 4095.0);
-    return Reflector(gloss.diffuse_viewer.rgb, gloss.f0_rest.rgb, float(rest >> 12u & 1023u) * (1.0 / 1023.0),
-                     roughness * roughness, float(rest >> 22u) * (1.0 / 1023.0));
+    vec2 f0_b_f90 = unpackHalf2x16(gloss.rest.y);
+    vec2 alpha_coat = unpackHalf2x16(gloss.rest.z);
+    return Reflector(gloss.diffuse_viewer.rgb, vec3(unpackHalf2x16(gloss.rest.x), f0_b_f90.x), f0_b_f90.y, alpha_coat.x,
+                     unpackHalf2x16(gloss.rest.w), alpha_coat.y);
 }
 
 Gloss gloss_of(Reflector reflector, vec3 v) {
-    uint rest = uint(sqrt(reflector.alpha) * 4095.0 + 0.5) | uint(reflector.f90 * 1023.0 + 0.5) << 12u |
-                uint(reflector.coat * 1023.0 + 0.5) << 22u;
     return Gloss(vec4(reflector.diffuse, uintBitsToFloat(encode_direction(v))),
-                 vec4(reflector.f0, uintBitsToFloat(rest)));
+                 uvec4(packHalf2x16(reflector.f0.rg), packHalf2x16(vec2(reflector.f0.b, reflector.f90)),
+                       packHalf2x16(vec2(reflector.alpha, reflector.coat)), packHalf2x16(reflector.over_base)));
 }
 
 // The fifth power of 1 − cosine.
@@ -49,6 +50,11 @@ float schlick(float cosine) {
 
 vec3 fresnel(Reflector reflector, float cosine) {
     return reflector.f0 + (reflector.f90 - reflector.f0) * schlick(cosine);
+}
+
+// What gets through to the base, alike for all colours (KHR_materials_specular), and past what isn't metal alone.
+float through_to_base(Reflector reflector, float cosine) {
+    return 1.0 - mix(reflector.over_base.x, reflector.over_base.y, schlick(cosine));
 }
 
 // Reflectance of a clear coat, whose index of refraction is 1.5.
@@ -86,12 +92,14 @@ vec3 brdf(Reflector reflector, vec3 n, vec3 v, vec3 l) {
     float nv = dot(n, v);
     float nl = dot(n, l);
     vec3 h = normalize(v + l);
-    vec3 f = fresnel(reflector, dot(v, h));
+    float cosine = dot(v, h);
+    vec3 f = fresnel(reflector, cosine);
+    float through = through_to_base(reflector, cosine);
     float alpha = max(reflector.alpha, SMOOTH_ALPHA);
     float visibility = 0.5 / (nl * masking_root(alpha, nv) + nv * masking_root(alpha, nl));
     float lobe = reflector.alpha < SMOOTH_ALPHA ? 0.0 : ggx(alpha, n, h) * visibility;
-    vec3 value = (1.0 - f) * reflector.diffuse * (1.0 / PI) + f * lobe;
-    return nv > 0.0 && nl > 0.0 ? coat_passes(reflector.coat, dot(v, h)) * value : vec3(0.0);
+    vec3 value = through * reflector.diffuse * (1.0 / PI) + f * lobe;
+    return nv > 0.0 && nl > 0.0 ? coat_passes(reflector.coat, cosine) * value : vec3(0.0);
 }
 
 // Share of the samples that go to the boundary's reflection: at least a quarter, for what it mirrors may be bright.

@@ -220,7 +220,7 @@ Reflector reflector_of(Material material) {
     return Reflector(material.base_color * (1.0 - material.metallic),
                      mix(material.specular_f0, material.base_color, material.metallic),
                      mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness,
-                     material.coat);
+                     vec2(largest(material.specular_f0), material.specular_f90), material.coat);
 }
 
 struct Hit {

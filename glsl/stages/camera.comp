@@ -82,6 +82,35 @@ Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, uint medium
     return Glimpse(emission, dark);
 }
 
+// What a narrow reflection shows of the lights without extent, which no direction of it meets: by a ray to one of them or, where
+// visible points are found once, to each.
+vec3 glint(Surface surface, Facing facing, Reflector reflector, vec3 viewer, inout Random random) {
+    vec4 u = next4(random);
+    uint chosen = choose_light(u.x, u.yz).light;
+    bool of_one = settings.slots_per_pixel == 1u;
+    uint begin = of_one ? chosen : 0u;
+    uint end = of_one ? chosen + 1u : settings.light_count;
+    vec3 origin = offset_origin(surface.position, facing.geometric_normal, surface.reach);
+    reflector.diffuse = vec3(0.0);
+    vec3 sum = vec3(0.0);
+    for (uint i = begin; i < end && !loops_cut; i++) {
+        Light light = light_at(i);
+        if (!is_punctual(light.kind)) {
+            continue;
+        }
+        Arriving arriving = arriving_from(punctual_light_at(i), light.kind, origin);
+        vec3 direction = normalize(arriving.ray);
+        float cosine = dot(direction, facing.shading_normal);
+        bool faces = cosine > 0.0 && dot(direction, facing.geometric_normal) > 0.0 && largest(arriving.irradiance) > 0.0;
+        if (faces && trace_visible(origin, arriving.ray, arriving.end, NO_TRIANGLE, true, random).triangle == MISS) {
+            float probability = of_one ? light.probability : 1.0;
+            sum += brdf(reflector, facing.shading_normal, viewer, direction) * arriving.irradiance *
+                   (cosine / probability);
+        }
+    }
+    return sum;
+}
+
 // Follows what a boundary of microfacets reflects, or none of it where that would fly into the surface.
 void reflect_branch(inout Branch branch, Reflector reflector, Facing facing, vec2 u) {
     vec3 viewer = -branch.direction;
@@ -135,7 +164,7 @@ void main() {
     bool alive = inside;
     bool cut = false;
     VisiblePoint visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
-    Gloss gloss = Gloss(vec4(0.0), vec4(0.0));
+    Gloss gloss = Gloss(vec4(0.0), uvec4(0u));
     while (alive) {
         loop_count += 1u;
         bool ended = true;
@@ -171,7 +200,8 @@ void main() {
                 branch.throughput *= choose_layer(material, facing, surface, branch.direction, u.x);
             }
             // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
-            Reflector reflector = Reflector(material.base_color, vec3(0.0), 0.0, 0.0, 0.0);
+            Reflector reflector = NO_REFLECTOR;
+            reflector.diffuse = material.base_color;
             if (is_glossy(material)) {
                 reflector = reflector_of(material);
             }
@@ -192,6 +222,9 @@ void main() {
                     }
                     branch.direction = mirror_direction(facing, branch.direction);
                 } else if (is_glossy(material)) {
+                    if (PUNCTUAL_LIGHTS && reflector.alpha >= SMOOTH_ALPHA) {
+                        branch.emitted += branch.throughput * glint(surface, facing, reflector, viewer, random);
+                    }
                     Branch reflected = branch;
                     float p = reflection_probability(reflector, dot(viewer, facing.shading_normal));
                     reflect_branch(reflected, reflector, facing, u.yz);

@@ -94,7 +94,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     question.end = 1e30;
     question.ignored = NO_TRIANGLE;
     // A reflection may be too narrow for points of lights to find it.
-    Reflector reflector = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0);
+    Reflector reflector = NO_REFLECTOR;
     vec3 viewer = vec3(0.0);
     float bsdf_sampling = settings.bsdf_sampling;
     float reflections = 0.0; // of the directions of the BSDF

@@ -16,10 +16,12 @@ from . import gltf
 def main():
     arguments = parse()
     try:
-        meshes, cameras = gltf.load(arguments.scene, arguments.matte)
+        meshes, cameras, lights, notes = gltf.load(arguments.scene)
         camera = choose(cameras, arguments.camera)
-        if all(max(mesh.material.emission) == 0 for mesh in meshes):
-            raise gltf.Unsupported("nothing in the scene emits light")
+        if not arguments.environment and not lights and not any(mesh.material.has_emission() for mesh in meshes):
+            notes.append("it has no light, and gets an environment of radiance 1")
+            arguments.environment = (1.0, 1.0, 1.0)
+        notes += lost_light(meshes, lights, arguments.light_tracing)
         if not arguments.output.parent.is_dir():
             raise gltf.Unsupported(f"there is no folder {arguments.output.parent} for the picture")
     except gltf.Unsupported as error:
@@ -28,16 +30,28 @@ def main():
         fail(f"{error.filename}: {error.strerror}")
     except (KeyError, IndexError, ValueError, TypeError) as error:
         fail(f"{arguments.scene}: this is no glTF file, or a damaged one ({type(error).__name__}: {error})")
+    for note in notes:
+        print(f"reference: {arguments.scene}: {note}", file=sys.stderr)
     resolution = arguments.resolution or (256, max(1, round(256 / (camera.aspect or 1))))
-    render(arguments, meshes, camera, resolution)
+    render(arguments, (meshes, camera, lights, arguments.environment), resolution)
 
 
-def render(arguments, meshes, camera, resolution):
+def lost_light(meshes, lights, is_light_tracing):
+    """What no path from the camera finds: light without extent by way of what is smooth."""
+    specular = sorted({mesh.material.name for mesh in meshes if mesh.material.is_specular()})
+    if not lights or not specular:
+        return []
+    where = "where it is seen by mirrors or glass" if is_light_tracing else "(--light-tracing finds some of it)"
+    names = ", ".join(f"«{name}»" for name in specular)
+    return [f"what {names} make of the punctual lights is missing {where}"]
+
+
+def render(arguments, world, resolution):
     try:
         from . import render as rendering
         from . import scene as scenes
 
-        scene = scenes.build(meshes, camera, resolution, is_aimed=arguments.light_tracing)
+        scene, has_media = scenes.build(*world, resolution, is_traced_from_lights=arguments.light_tracing)
     except ImportError as error:
         fail(str(error))
     except gltf.Unsupported as error:
@@ -46,13 +60,13 @@ def render(arguments, meshes, camera, resolution):
 
     pixels = np.arange(resolution[0] * resolution[1])
     if arguments.light_tracing:
-        without = scenes.build(meshes, camera, resolution, has_specular=False, is_aimed=True)
+        without, _ = scenes.build(*world, resolution, has_specular=False, is_traced_from_lights=True)
         groups = rendering.by_noise(scene, pixels, without)
         parts = [rendering.Caustics(scene, without, pixels)]
         for number, group in enumerate(groups, 1):
             parts.append(rendering.Paths(f"pixels {number}", scene, group, arguments.spp, without))
     else:
-        parts = [rendering.Paths("pixels", scene, pixels, arguments.spp)]
+        parts = [rendering.Paths("pixels", scene, pixels, arguments.spp, has_media=has_media)]
     estimate = rendering.Estimate(parts)
     start = told = time.perf_counter()
     while estimate.go_on(arguments.spp, arguments.seconds):
@@ -67,6 +81,7 @@ def render(arguments, meshes, camera, resolution):
         "spp": {part.name: part.spp() for part in estimate.parts} if arguments.light_tracing else parts[0].spp(),
         "seconds": round(time.perf_counter() - start, 1),
         "rel_rmse_of_mean": float(f"{estimate.error():.3g}"),
+        "rel_error_of_whole": [float(f"{error:.2g}") for error in estimate.error_of_whole()],
         "mean": [round(value, 6) for value in mean.mean(axis=0).tolist()],
     }
     picture = mitsuba.Bitmap(mean.reshape(resolution[1], resolution[0], 3).astype(np.float32))
@@ -91,9 +106,10 @@ def parse():
         help="trace what mirrors and glass throw on matte surfaces from the lights: for caustics of small lights",
     )
     parser.add_argument(
-        "--matte",
-        action="store_true",
-        help="leave out the specular lobe that most glTF materials have over their base colour, as ppm-vk does",
+        "--environment",
+        type=environment,
+        metavar="FILE|R,G,B",
+        help="light from all around, as ppm-vk has it: an equirectangular picture or one radiance",
     )
     arguments = parser.parse_args()
     if min(arguments.spp, arguments.seconds) == math.inf:
@@ -106,6 +122,18 @@ def resolution(text):
     if not match:
         raise argparse.ArgumentTypeError(f"«{text}» isn't like 640x480")
     return int(match[1]), int(match[2])
+
+
+def environment(text):
+    try:
+        radiance = tuple(float(value) for value in text.split(","))
+    except ValueError:
+        if Path(text).is_file():
+            return Path(text)
+        raise argparse.ArgumentTypeError(f"«{text}» is neither a file nor three numbers like 1,1,1") from None
+    if len(radiance) != 3:
+        raise argparse.ArgumentTypeError(f"«{text}» isn't like 1,1,1")
+    return radiance
 
 
 def choose(cameras, name_or_index):

@@ -1,4 +1,4 @@
-"""Reads the part of glTF 2.0 that can be path-traced exactly; anything else is an Unsupported error, not a guess.
+"""Reads the part of glTF 2.0 that can be path-traced; anything else is an Unsupported error or a note, not a guess.
 
 Triangles come out in world space, in f64, each with corners of its own.
 """
@@ -22,17 +22,61 @@ class Texture:
     data: bytes  # a PNG or JPEG file
     wrap: tuple  # of u and v: "repeat", "mirror" or "clamp"
     nearest: bool
+    set: int  # which texture coordinates
+    transform: np.ndarray  # 2 × 3, of the coordinates
 
 
 @dataclass(frozen=True)
 class Material:
     name: str
-    kind: str  # "matte", "mirror" or "glass"
     base_color: tuple
-    texture: Texture | None
+    metallic: float
+    roughness: float
     ior: float
+    specular: float
+    specular_color: tuple
+    transmission: float
+    is_thin: bool
+    absorption: tuple  # 1/length
     emission: tuple
     double_sided: bool
+    alpha_mode: str
+    alpha: float
+    alpha_cutoff: float
+    textures: dict  # by slot: see SLOTS
+    normal_scale: float
+
+    def alpha_of(self, ratio):
+        """Microfacets' α."""
+        return (self.roughness * ratio) ** 2
+
+    def is_smooth(self):
+        return "metallic_roughness" not in self.textures and self.alpha_of(1) < SMOOTH_ALPHA
+
+    def is_metal(self):
+        return self.metallic == 1 and "metallic_roughness" not in self.textures
+
+    def is_clear(self):
+        return self.transmission > 0 and not self.is_metal()
+
+    def is_solid(self):
+        """Glass with an inside."""
+        return self.is_clear() and not self.is_thin
+
+    def is_specular(self):
+        """Whether it has a smooth boundary: light reaches it from one direction alone."""
+        is_glossy = self.metallic > 0 or self.specular > 0 and self.ior != 1
+        return self.is_smooth() and (self.is_clear() or is_glossy)
+
+    def is_matte(self):
+        return not self.is_clear() and self.metallic == 0 and self.specular == 0
+
+    def has_emission(self):
+        return max(self.emission) > 0
+
+
+# Below this α a boundary is taken for a mirror.
+SMOOTH_ALPHA = 1e-3
 
 
 @dataclass
@@ -41,7 +85,9 @@ class Mesh:
     material: Material
     positions: np.ndarray  # triangles × 3 corners × 3, counter-clockwise from the front
     normals: np.ndarray  # likewise, on the front
-    texcoords: np.ndarray | None  # triangles × 3 corners × 2, v downwards
+    texcoords: dict  # by set: triangles × 3 corners × 2, v downwards
+    colors: np.ndarray | None  # triangles × 3 corners × 4
+    tangents: np.ndarray | None  # triangles × 3 corners × 4, the last one the bitangent's side
 
 
 @dataclass
@@ -50,8 +96,20 @@ class Camera:
     position: np.ndarray
     forward: np.ndarray
     up: np.ndarray
-    yfov: float
+    yfov: float | None
+    ymag: float | None  # of an orthographic one: half of the height that it shows
     aspect: float | None
+
+
+@dataclass
+class Light:
+    name: str
+    kind: str  # "point", "spot" or "directional"
+    intensity: np.ndarray  # candela, of a directional one lux
+    position: np.ndarray
+    direction: np.ndarray
+    range: float | None
+    cosines: tuple  # of a spot's inner and outer angle
 
 
 MATERIAL_EXTENSIONS = {
@@ -61,19 +119,32 @@ MATERIAL_EXTENSIONS = {
     "KHR_materials_transmission",
     "KHR_materials_volume",
 }
+EXTENSIONS = MATERIAL_EXTENSIONS | {"KHR_lights_punctual", "KHR_texture_transform"}
+# Textures by their place in a material.
+SLOTS = {
+    "base_color": ("pbr", "baseColorTexture"),
+    "metallic_roughness": ("pbr", "metallicRoughnessTexture"),
+    "normal": ("json", "normalTexture"),
+    "emission": ("json", "emissiveTexture"),
+    "transmission": ("transmission", "transmissionTexture"),
+    "specular": ("specular", "specularTexture"),
+    "specular_color": ("specular", "specularColorTexture"),
+}
+# Of those that a path tracer has no use for.
+UNUSED_TEXTURES = {"occlusionTexture", "thicknessTexture"}
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
-def load(path, is_matte=False):
-    """The meshes and cameras of the file's scene. With `is_matte` specular lobes over base colours are left out."""
-    return Reader(Path(path), is_matte).read()
+def load(path):
+    """The meshes, cameras and punctual lights of the file's scene, and notes on what is not as the file has it."""
+    return Reader(Path(path)).read()
 
 
 class Reader:
-    def __init__(self, path, is_matte):
+    def __init__(self, path):
         self.folder = path.parent
-        self.is_matte = is_matte
+        self.notes = []
         data = path.read_bytes()
         self.chunk = None
         if data[:4] == b"glTF":
@@ -82,17 +153,20 @@ class Reader:
             data = data[20 : 20 + length]
         self.json = json.loads(data)
         for extension in self.json.get("extensionsRequired", []):
-            if extension not in MATERIAL_EXTENSIONS:
+            if extension not in EXTENSIONS:
                 raise Unsupported(f"the file requires {extension}, which isn't supported")
         self.buffers = {}
 
     def read(self):
-        meshes, cameras = [], []
+        meshes, cameras, lights = [], [], []
+        if self.json.get("animations"):
+            self.note("it has animations: everything is at rest")
         for node, to_world in self.nodes():
             name = node.get("name", "")
             if "camera" in node:
-                camera = self.camera(self.json["cameras"][node["camera"]], node, to_world)
-                cameras += [camera] if camera else []
+                cameras.append(self.camera(self.json["cameras"][node["camera"]], node, to_world))
+            if "KHR_lights_punctual" in node.get("extensions", {}):
+                lights.append(self.light(node["extensions"]["KHR_lights_punctual"]["light"], node, to_world))
             if "mesh" in node:
                 mesh = self.json["meshes"][node["mesh"]]
                 if "skin" in node or "weights" in mesh or "weights" in node:
@@ -101,8 +175,13 @@ class Reader:
         if not meshes:
             raise Unsupported("the scene has no meshes")
         if not cameras:
-            raise Unsupported("the scene has no perspective camera")
-        return meshes, cameras
+            self.note("it has no camera, and gets one that is framed on its bounds")
+            cameras = [framed_on(np.concatenate([mesh.positions.reshape(-1, 3) for mesh in meshes]))]
+        return meshes, cameras, lights, self.notes
+
+    def note(self, what):
+        if what not in self.notes:
+            self.notes.append(what)
 
     # --- Nodes
 
@@ -121,26 +200,42 @@ class Reader:
             if index in seen:
                 raise Unsupported(f"node {index} has two parents or is its own ancestor")
             seen.add(index)
-            if node.get("extensions"):
-                what = ", ".join(node["extensions"])
+            others = node.get("extensions", {}).keys() - {"KHR_lights_punctual"}
+            if others:
+                what = ", ".join(sorted(others))
                 raise Unsupported(f"node «{node.get('name', index)}» has {what}, which isn't supported")
             to_world = parent @ transform(node)
             yield node, to_world
             stack += [(child, to_world) for child in reversed(node.get("children", []))]
 
     def camera(self, camera, node, to_world):
-        if camera["type"] != "perspective":
-            return None
         # A camera ignores the node's scale, also where it mirrors.
         axes = to_world[:3, :3] * np.sign(node.get("scale", [1, 1, 1]))
-        perspective = camera["perspective"]
+        lens = camera[camera["type"]]
+        is_perspective = camera["type"] == "perspective"
         return Camera(
             names=(camera.get("name"), node.get("name")),
             position=to_world[:3, 3],
             forward=-axes[:, 2],
             up=axes[:, 1],
-            yfov=perspective["yfov"],
-            aspect=perspective.get("aspectRatio"),
+            yfov=lens["yfov"] if is_perspective else None,
+            ymag=None if is_perspective else abs(lens["ymag"]),
+            aspect=lens.get("aspectRatio") if is_perspective else abs(lens["xmag"] / lens["ymag"]),
+        )
+
+    def light(self, index, node, to_world):
+        light = self.json["extensions"]["KHR_lights_punctual"]["lights"][index]
+        spot = light.get("spot", {})
+        angles = spot.get("innerConeAngle", 0.0), spot.get("outerConeAngle", np.pi / 4)
+        direction = -to_world[:3, 2]
+        return Light(
+            name=light.get("name", node.get("name", f"light {index}")),
+            kind=light["type"],
+            intensity=np.array(light.get("color", [1, 1, 1]), float) * light.get("intensity", 1.0),
+            position=to_world[:3, 3],
+            direction=direction / np.linalg.norm(direction),
+            range=light.get("range"),
+            cosines=tuple(np.cos(angles)),
         )
 
     # --- Geometry
@@ -150,8 +245,6 @@ class Reader:
         material = self.material(primitive.get("material"))
         if primitive.get("extensions") or primitive.get("targets"):
             raise Unsupported(f"mesh «{name}» is compressed, has variants or morph targets, which aren't supported")
-        if "COLOR_0" in attributes:
-            raise Unsupported(f"mesh «{name}» has vertex colours, which aren't supported")
         positions = self.accessor(attributes["POSITION"]).astype(float)
         count = len(positions)
         indices = self.accessor(primitive["indices"]).ravel() if "indices" in primitive else np.arange(count)
@@ -166,26 +259,40 @@ class Reader:
         face = face / area[area > 0, None]
         normals = np.repeat(face[:, None], 3, axis=1)
         if "NORMAL" in attributes:
-            given = self.accessor(attributes["NORMAL"]).astype(float) @ np.linalg.inv(linear)
+            given = self.accessor(attributes["NORMAL"], True).astype(float) @ np.linalg.inv(linear)
             given = given[corners]
             length = np.linalg.norm(given, axis=2, keepdims=True)
             given = given / np.where(length > 0, length, 1)
             # Normals that point to the back say nothing.
             is_good = np.einsum("tcx,tx->tc", given, face)[..., None] > 0
             normals = np.where(is_good, given, normals)
-        texcoords = None
-        if material.texture:
-            if "TEXCOORD_0" not in attributes:
-                raise Unsupported(f"mesh «{name}» has a texture, but no texture coordinates")
-            texcoords = self.accessor(attributes["TEXCOORD_0"], is_normalised=True).astype(float)[corners]
-        return Mesh(name, material, positions, normals, texcoords)
+        texcoords, tangents = {}, None
+        for texture in material.textures.values():
+            attribute = f"TEXCOORD_{texture.set}"
+            if attribute not in attributes:
+                raise Unsupported(f"mesh «{name}» has a texture, but no {attribute}")
+            texcoords[texture.set] = self.accessor(attributes[attribute], True).astype(float)[corners]
+        if "normal" in material.textures:
+            coordinates = texcoords[material.textures["normal"].set]
+            tangents = tangents_of(positions, normals, coordinates)
+            if "TANGENT" in attributes and "NORMAL" in attributes:
+                given = self.accessor(attributes["TANGENT"], True).astype(float)
+                side = np.sign(given[:, 3:]) * np.sign(np.linalg.det(linear))
+                tangents = np.concatenate([given[:, :3] @ linear.T, side], axis=1)[corners]
+        colors = None
+        if "COLOR_0" in attributes:
+            given = self.accessor(attributes["COLOR_0"], True).astype(float)
+            colors = np.ones((len(given), 4))
+            colors[:, : given.shape[1]] = given
+            colors = colors[corners]
+        return Mesh(name, material, positions, normals, texcoords, colors, tangents)
 
     def accessor(self, index, is_normalised=False):
         accessor = self.json["accessors"][index]
         if "sparse" in accessor or "bufferView" not in accessor:
             raise Unsupported(f"accessor {index} is sparse, which isn't supported")
         dtype = np.dtype(COMPONENTS[accessor["componentType"]])
-        if accessor.get("normalized", False) and not (is_normalised and dtype.kind == "u"):
+        if accessor.get("normalized", False) and not is_normalised:
             raise Unsupported(f"accessor {index} is quantised, which isn't supported")
         width, count = WIDTHS[accessor["type"]], accessor["count"]
         view = self.json["bufferViews"][accessor["bufferView"]]
@@ -195,7 +302,7 @@ class Reader:
         if count and start + stride * (count - 1) + dtype.itemsize * width > len(data):
             raise Unsupported(f"accessor {index} reaches past the end of its buffer")
         array = np.ndarray((count, width), dtype, data, start, (stride, dtype.itemsize))
-        return array / np.iinfo(dtype).max if accessor.get("normalized", False) else array
+        return np.maximum(array / np.iinfo(dtype).max, -1) if accessor.get("normalized", False) else array
 
     def buffer(self, index):
         if index not in self.buffers:
@@ -225,50 +332,66 @@ class Reader:
             extensions.get(f"KHR_materials_{which}", {})
             for which in ("transmission", "specular", "volume", "emissive_strength")
         )
-        # A volume's thickness texture is for renderers that don't trace through the solid.
-        slots = [json, pbr, transmission, specular]
-        for slot in {key for slot in slots for key in slot if key.endswith("Texture")} - {"baseColorTexture"}:
-            refuse(f"its {slot} isn't supported")
-        if json.get("alphaMode", "OPAQUE") != "OPAQUE":
-            refuse("it isn't opaque, which isn't supported")
-        metallic, roughness = pbr.get("metallicFactor", 1.0), pbr.get("roughnessFactor", 1.0)
-        transmitted = transmission.get("transmissionFactor", 0.0)
-        ior = extensions.get("KHR_materials_ior", {}).get("ior", 1.5)
-        if metallic not in (0, 1) or transmitted not in (0, 1):
-            refuse("a metallicFactor or transmissionFactor between 0 and 1 isn't supported")
-        if (metallic == 1 or transmitted == 1) and roughness > 0:
-            refuse(f"rough metal and glass aren't supported (roughnessFactor {roughness})")
-        if metallic == 1:
-            kind = "mirror"
-        elif transmitted == 1:
-            kind = "glass"
-            if volume.get("thicknessFactor", 0.0) == 0:
-                refuse("transmission without a thickness is a thin wall, which isn't supported")
-            if volume.get("attenuationColor", [1, 1, 1]) != [1, 1, 1] and "attenuationDistance" in volume:
-                refuse("absorption isn't supported")
-            if specular.get("specularFactor", 1.0) != 1 or "specularColorFactor" in specular or ior == 0:
-                refuse("glass whose reflection doesn't follow from its index of refraction isn't supported")
-        else:
-            kind = "matte"
-            if specular.get("specularFactor", 1.0) != 0 and not self.is_matte:
-                refuse("a specular lobe over the base colour isn't supported (--matte leaves it out)")
-        texture = self.texture(pbr["baseColorTexture"], refuse) if "baseColorTexture" in pbr else None
-        if texture and kind != "matte":
-            refuse("textures on metal and glass aren't supported")
+        places = {"json": json, "pbr": pbr, "transmission": transmission, "specular": specular, "volume": volume}
+        textures = {
+            slot: self.texture(places[place][key], f"material «{name}»: its {key}", refuse)
+            for slot, (place, key) in SLOTS.items()
+            if key in places[place]
+        }
+        known = {key for _, key in SLOTS.values()} | UNUSED_TEXTURES
+        for unknown in {key for place in places.values() for key in place if key.endswith("Texture")} - known:
+            refuse(f"its {unknown} isn't supported")
+        for key in UNUSED_TEXTURES & (json.keys() | volume.keys()):
+            self.note(f"material «{name}»: its {key} is for renderers that don't trace light, and is left out")
+        color = pbr.get("baseColorFactor", [1, 1, 1, 1])
+        distance = volume.get("attenuationDistance", np.inf)
+        kept = np.maximum(volume.get("attenuationColor", [1, 1, 1]), 1e-10)
         factor = strength.get("emissiveStrength", 1.0)
-        return Material(
+        material = Material(
             name=name,
-            kind=kind,
-            base_color=tuple(pbr.get("baseColorFactor", [1, 1, 1, 1])[:3]),
-            texture=texture,
-            ior=ior,
+            base_color=tuple(color[:3]),
+            metallic=pbr.get("metallicFactor", 1.0),
+            roughness=pbr.get("roughnessFactor", 1.0),
+            ior=extensions.get("KHR_materials_ior", {}).get("ior", 1.5),
+            specular=specular.get("specularFactor", 1.0),
+            specular_color=tuple(specular.get("specularColorFactor", [1, 1, 1])),
+            transmission=transmission.get("transmissionFactor", 0.0),
+            is_thin=volume.get("thicknessFactor", 0.0) == 0,
+            absorption=tuple(-np.log(kept) / distance),
             emission=tuple(factor * value for value in json.get("emissiveFactor", [0, 0, 0])),
             double_sided=json.get("doubleSided", False),
+            alpha_mode=json.get("alphaMode", "OPAQUE"),
+            alpha=color[3],
+            alpha_cutoff=json.get("alphaCutoff", 0.5),
+            textures=textures,
+            normal_scale=json.get("normalTexture", {}).get("scale", 1.0),
         )
+        self.check(material, refuse)
+        return material
 
-    def texture(self, info, refuse):
-        if info.get("texCoord", 0) != 0 or info.get("extensions"):
-            refuse("texture transforms and second texture coordinates aren't supported")
+    def check(self, material, refuse):
+        """Says what isn't as the file has it."""
+        if material.ior == 0:
+            refuse("an index of refraction of 0 isn't supported")
+        if not material.is_clear():
+            return
+        if material.specular != 1 or material.specular_color != (1, 1, 1):
+            self.note(f"material «{material.name}»: KHR_materials_specular on its clear part is left out")
+        if material.is_solid():
+            for slot in material.textures.keys() & {"normal", "emission"}:
+                refuse(f"glass with an inside and a texture of its {slot} isn't supported")
+            if material.alpha_mode != "OPAQUE":
+                refuse("glass with an inside that isn't opaque by its alpha isn't supported")
+            if material.metallic != 0:
+                refuse("glass with an inside and a metallicFactor other than 0 isn't supported")
+
+    def texture(self, info, what, refuse):
+        transform = info.get("extensions", {}).get("KHR_texture_transform", {})
+        for extension in info.get("extensions", {}).keys() - {"KHR_texture_transform"}:
+            refuse(f"{extension} on a texture isn't supported")
+        angle = transform.get("rotation", 0.0)
+        (x, y), (w, h) = transform.get("offset", [0, 0]), transform.get("scale", [1, 1])
+        rows = np.array([[np.cos(angle) * w, np.sin(angle) * h, x], [-np.sin(angle) * w, np.cos(angle) * h, y]])
         texture = self.json["textures"][info["index"]]
         sampler = self.json["samplers"][texture["sampler"]] if "sampler" in texture else {}
         image = self.json["images"][texture["source"]] if "source" in texture else refuse("its texture has no image")
@@ -280,7 +403,58 @@ class Reader:
             data = bytes(self.buffer(view["buffer"])[start : start + view["byteLength"]])
         wraps = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
         wrap = tuple(wraps[sampler.get(axis, 10497)] for axis in ("wrapS", "wrapT"))
-        return Texture(data, wrap, nearest=sampler.get("magFilter") == 9728)
+        if wrap[0] != wrap[1]:
+            refuse(f"{what} wraps differently in u and v, which isn't supported")
+        return Texture(
+            data,
+            wrap,
+            nearest=sampler.get("magFilter") == 9728,
+            set=transform.get("texCoord", info.get("texCoord", 0)),
+            transform=rows,
+        )
+
+
+def tangents_of(positions, normals, coordinates):
+    """Tangents where the file gives none, as MikkTSpace has them: those of the triangles around a corner of one position,
+    normal and coordinates, each projected across the normal, weighed by the angles at the corner."""
+    edges = positions[:, 1:] - positions[:, :1]
+    across = coordinates[:, 1:] - coordinates[:, :1]
+    area = across[:, 0, 0] * across[:, 1, 1] - across[:, 0, 1] * across[:, 1, 0]
+    side = np.where(area >= 0, 1.0, -1.0)
+    along = edges[:, 0] * across[:, 1, 1, None] - edges[:, 1] * across[:, 0, 1, None]
+    along = (along * side[:, None])[:, None]
+    along = unit(along - np.sum(along * normals, axis=2, keepdims=True) * normals)
+    to_next, to_last = (unit(np.roll(positions, -step, axis=1) - positions) for step in (1, 2))
+    angle = np.arccos(np.clip(np.sum(to_next * to_last, axis=2), -1, 1))
+    sides = np.repeat(side[:, None], 3, axis=1)
+    keys = np.concatenate([positions, normals, coordinates, sides[..., None]], axis=2).reshape(len(positions) * 3, -1)
+    _, group = np.unique(keys, axis=0, return_inverse=True)
+    group = group.ravel()
+    sums = np.zeros((group.max() + 1, 3))
+    np.add.at(sums, group, (along * angle[..., None]).reshape(-1, 3))
+    # v runs down the picture, but the green of a normal texture points up it.
+    return np.concatenate([unit(sums)[group].reshape(-1, 3, 3), -sides[..., None]], axis=2)
+
+
+def unit(vectors):
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1)
+
+
+def framed_on(points):
+    """The camera that ppm-vk gives to a scene without any: it looks 15° down along -Z, from where it sees all of the bounds
+    in an angle of 40°, and 5 % further away."""
+    pitch, tangent = np.radians(15), np.tan(np.radians(20))
+    forward = np.array([0, -np.sin(pitch), -np.cos(pitch)])
+    right = np.array([1.0, 0, 0])
+    up = np.cross(right, forward)
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    centre = (lower + upper) / 2
+    signs = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
+    offsets = signs * (upper - centre)
+    reach = np.maximum(np.abs(offsets @ right), np.abs(offsets @ up))
+    distance = max((reach / tangent - offsets @ forward).max(), 0) * 1.05
+    return Camera(("framed on the bounds", None), centre - forward * distance, forward, up, np.radians(40), None, None)
 
 
 def triangles(mode, indices, name):

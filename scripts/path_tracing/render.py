@@ -53,11 +53,12 @@ class Paths(Part):
     the rest of what they would find is `Caustics`.
     """
 
-    def __init__(self, name, scene, pixels, spp, without=None):
+    def __init__(self, name, scene, pixels, spp, without=None, has_media=False):
         super().__init__(name, pixels, np.prod(scene.sensors()[0].film().size()))
         self.scene = scene
         self.without = without
-        self.integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE_DEPTH})
+        kind = "volpath" if has_media else "path"
+        self.integrator = mi.load_dict({"type": kind, "max_depth": -1, "rr_depth": ROULETTE_DEPTH})
         # Two passes are the least.
         self.samples = int(np.clip(LANES // max(len(pixels), 1), 1, np.ceil(spp / 2)))
 
@@ -160,6 +161,11 @@ class Estimate:
         mean = self.mean()
         variance = sum(part.variance_of_mean() for part in ([part] if part else self.parts))
         return np.sqrt(np.mean(variance / (mean**2 + 0.01 * mean.mean() ** 2)))
+
+    def error_of_whole(self):
+        """Relative standard errors of the mean of all pixels, for each channel. Pixels are independent."""
+        variance = sum(part.variance_of_mean() for part in self.parts)
+        return np.sqrt(variance.sum(axis=0)) / self.mean().sum(axis=0)
 
     def go_on(self, spp, seconds):
         """One more pass of the part where the time lowers the error most; False when there is nothing left to do."""

@@ -9,7 +9,6 @@ import numpy as np
 
 from . import gltf
 
-
 def start_mitsuba():
     try:
         mi.set_variant("llvm_ad_rgb")
@@ -23,59 +22,20 @@ def start_mitsuba():
 
 
 start_mitsuba()
+from .material import Look, Surface, bsdf  # noqa: E402 (needs the variant)
+
 # With one thread, as where there is one core, Mitsuba 3.9.1 waits for ever for an OpenEXR file to be written.
 dr.set_thread_count(max(2, dr.thread_count()))
 
 
-class SchlickMirror(mi.BSDF):
-    """A mirror on both sides. Its Fresnel term is Schlick's with the base colour at normal incidence: glTF 2.0,
-    appendix B. Mitsuba's own conductors take complex indices of refraction."""
-
-    def __init__(self, props):
-        mi.BSDF.__init__(self, props)
-        self.f0 = mi.Color3f(props["f0"])
-        self.m_components = [mi.BSDFFlags.DeltaReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide]
-        self.m_flags = self.m_components[0]
-
-    def sample(self, context, si, sample1, sample2, active=True):
-        bs = dr.zeros(mi.BSDFSample3f)
-        # Off an interpolated normal the mirror direction may point into the surface: then the true normal takes its place.
-        geometric = si.to_local(si.n)
-        side = dr.sign(dr.dot(si.wi, geometric))
-        about_shading = mi.reflect(si.wi)
-        about_geometric = 2 * dr.dot(si.wi, geometric) * geometric - si.wi
-        is_good = (side * dr.dot(about_shading, geometric) > 0) & (side * si.wi.z > 0)
-        bs.wo = dr.select(is_good, about_shading, about_geometric)
-        cosine = dr.clip(dr.select(is_good, dr.abs(si.wi.z), side * dr.dot(si.wi, geometric)), 0, 1)
-        bs.pdf = 1
-        bs.eta = 1
-        bs.sampled_type = +mi.BSDFFlags.DeltaReflection
-        bs.sampled_component = 0
-        one_minus = 1 - cosine
-        power = dr.square(dr.square(one_minus)) * one_minus
-        return bs, dr.select(active, self.f0 + (1 - self.f0) * power, 0)
-
-    def eval(self, context, si, wo, active=True):
-        return mi.Color3f(0)
-
-    def pdf(self, context, si, wo, active=True):
-        return mi.Float(0)
-
-    def eval_pdf(self, context, si, wo, active=True):
-        return mi.Color3f(0), mi.Float(0)
-
-    def to_string(self):
-        return f"SchlickMirror[{self.f0}]"
-
-
 class Lamp(mi.Emitter):
-    """An area light of uniform radiance that may emit on both sides (Mitsuba's own emit on the front alone), and that may
-    aim half of the rays that start on it at a sphere."""
+    """An area light with a texture, which may emit on both sides (Mitsuba's own emit on the front alone), be there in part,
+    and aim half of the rays that start on it at a sphere."""
 
     def __init__(self, props):
         mi.Emitter.__init__(self, props)
-        self.radiance = mi.Color3f(props["radiance"])
-        self.double_sided = props["double_sided"]
+        self.look = Look.of(props)
+        self.double_sided = self.look.material.double_sided
         self.is_aimed = props.has_property("radius")
         if self.is_aimed:
             self.centre = mi.Point3f(props["centre"])
@@ -85,21 +45,33 @@ class Lamp(mi.Emitter):
     def emits(self, cosine):
         return cosine != 0 if self.double_sided else cosine > 0
 
+    def radiance(self, si, active=True):
+        """What a place emits: all of it, as a path that meets it can also pass it."""
+        return self.look.emission(si, active)
+
+    def share(self, ps, active=True):
+        """The part of a place on a lamp that is there, and the place for its textures."""
+        si = mi.SurfaceInteraction3f(ps, [])
+        return self.look.opacity(si, active), si
+
     def eval(self, si, active=True):
-        return dr.select(active & self.emits(si.wi.z), self.radiance, 0)
+        # What lets a path pass has also been met by it.
+        share = self.look.opacity(si, active)
+        return dr.select(active & self.emits(si.wi.z), self.radiance(si, active) * share, 0)
 
     def sample_direction(self, it, sample, active=True):
         ds = self.get_shape().sample_direction(it, sample, active)
         ds.emitter = mi.EmitterPtr(self)
         is_seen = active & (ds.pdf > 0) & self.emits(-dr.dot(ds.d, ds.n))
-        return ds, dr.select(is_seen, self.radiance / ds.pdf, 0)
+        return ds, self.eval_direction(it, ds, is_seen) / dr.select(is_seen, ds.pdf, 1)
 
     def pdf_direction(self, it, ds, active=True):
         is_seen = active & self.emits(-dr.dot(ds.d, ds.n))
         return dr.select(is_seen, self.get_shape().pdf_direction(it, ds, active), 0)
 
     def eval_direction(self, it, ds, active=True):
-        return dr.select(active & self.emits(-dr.dot(ds.d, ds.n)), self.radiance, 0)
+        share, si = self.share(ds, active)
+        return dr.select(active & self.emits(-dr.dot(ds.d, ds.n)), self.radiance(si, active) * share, 0)
 
     def sample_position(self, time, sample, active=True):
         ps = self.get_shape().sample_position(time, sample, active)
@@ -128,73 +100,176 @@ class Lamp(mi.Emitter):
             weight *= dr.select(density > 0, cosine / density, 0)
         else:
             weight *= dr.pi
-        si = mi.SurfaceInteraction3f(ps, [])
-        return si.spawn_ray(direction), self.radiance * weight
+        share, si = self.share(ps, active)
+        return si.spawn_ray(direction), self.radiance(si, active) * (share * weight)
 
     def sample_wavelengths(self, si, sample, active=True):
-        return mi.Color0f(), dr.select(active & self.emits(si.wi.z), self.radiance, 0)
+        return mi.Color0f(), self.eval(si, active)
 
     def to_string(self):
-        return f"Lamp[{self.radiance}]"
+        return f"Lamp[{self.look.material.name}]"
 
 
-mi.register_bsdf("schlick_mirror", SchlickMirror)
+class Punctual(mi.Emitter):
+    """A point light or a spot as KHR_lights_punctual recommends: a spot's intensity falls off with the square of a ramp in
+    the cosine, and a range ends all light. Mitsuba's own falls off otherwise, and has no range."""
+
+    def __init__(self, props):
+        mi.Emitter.__init__(self, props)
+        self.position, self.axis = mi.Point3f(props["position"]), mi.Vector3f(props["direction"])
+        self.intensity = mi.Color3f(props["intensity"])
+        self.is_spot = props["is_spot"]
+        self.inner, self.outer = props["inner"], props["outer"]
+        self.range = props["range"]
+        self.m_flags = +mi.EmitterFlags.DeltaPosition
+
+    def towards(self, direction):
+        """Intensity."""
+        if not self.is_spot:
+            return self.intensity
+        ramp = dr.clip((dr.dot(direction, self.axis) - self.outer) / max(self.inner - self.outer, 1e-3), 0, 1)
+        return self.intensity * dr.square(ramp)
+
+    def sample_direction(self, it, sample, active=True):
+        ds = dr.zeros(mi.DirectionSample3f)
+        ds.p, ds.time, ds.pdf, ds.delta = self.position, it.time, 1, True
+        ds.emitter = mi.EmitterPtr(self)
+        ds.d = ds.p - it.p
+        ds.dist = dr.norm(ds.d)
+        ds.d /= ds.dist
+        ds.n = -ds.d
+        return ds, dr.select(active, self.eval_direction(it, ds, active), 0)
+
+    def eval_direction(self, it, ds, active=True):
+        value = self.towards(-ds.d) / dr.square(ds.dist)
+        if self.range > 0:
+            value *= dr.clip(1 - (ds.dist / self.range) ** 4, 0, 1)
+        return dr.select(active, value, 0)
+
+    def pdf_direction(self, it, ds, active=True):
+        return mi.Float(0)
+
+    def eval(self, si, active=True):
+        return mi.Color3f(0)
+
+    def sample_ray(self, time, sample1, sample2, sample3, active=True):
+        # Light tracing: of lights without a range alone.
+        least_cosine = self.outer if self.is_spot else -1.0
+        direction = mi.Frame3f(self.axis).to_world(mi.warp.square_to_uniform_cone(sample3, least_cosine))
+        weight = self.towards(direction) * (2 * dr.pi * (1 - least_cosine))
+        return mi.Ray3f(self.position, direction, time, []), dr.select(active, weight, 0)
+
+    def sample_wavelengths(self, si, sample, active=True):
+        return mi.Color0f(), mi.Color3f(0)
+
+    def to_string(self):
+        return f"Punctual[{self.position}]"
+
+
+mi.register_bsdf("gltf", Surface)
 mi.register_emitter("lamp", Lamp)
+mi.register_emitter("punctual", Punctual)
 
-BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+BLACK = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}}
 
 
-def build(meshes, camera, resolution, has_specular=True, is_aimed=False):
-    """The scene. Without `has_specular` mirrors and glass are black, so that no light is left that has met any.
-    With `is_aimed` lights send half of their rays where mirrors and glass are.
+def build(meshes, camera, lights, environment, resolution, has_specular=True, is_traced_from_lights=False):
+    """The scene, and whether a path has to look for what absorbs light or is there in part.
 
-    It is moved and scaled to the cube from -1 to 1 (lengths have no part in what is supported): Mitsuba's f32 is coarse
-    far from the origin.
+    Without `has_specular` mirrors and glass are black, so that no light is left that has met any. Where rays are traced
+    from lights, half of them go where mirrors and glass are.
+
+    It is moved and scaled to the cube from -1 to 1: Mitsuba's f32 is coarse far from the origin.
     """
     points = np.concatenate([mesh.positions.reshape(-1, 3) for mesh in meshes])
     lower, upper = points.min(axis=0), points.max(axis=0)
     centre, scale = (lower + upper) / 2, 2 / (upper - lower).max()
-    position = (camera.position - centre) * scale
-    specular = [mesh.positions.reshape(-1, 3) for mesh in meshes if mesh.material.kind != "matte"]
-    aim = bounding_sphere((np.concatenate(specular) - centre) * scale) if is_aimed and specular else {}
-    width, height = resolution
-    scene = {
-        "type": "scene",
-        "sensor": {
-            "type": "perspective",
-            "to_world": mi.ScalarTransform4f().look_at(
-                origin=position.tolist(), target=(position + camera.forward).tolist(), up=camera.up.tolist()
-            ),
-            "fov_axis": "y",
-            "fov": float(np.degrees(camera.yfov)),
-            "near_clip": 1e-4,
-            "far_clip": 1e4,
-            "film": {
-                "type": "hdrfilm",
-                "width": width,
-                "height": height,
-                "pixel_format": "rgb",
-                "component_format": "float32",
-                "rfilter": {"type": "box"},
-            },
-            "sampler": {"type": "independent"},
-        },
-    }
+    specular = [mesh.positions.reshape(-1, 3) for mesh in meshes if mesh.material.is_specular()]
+    aim = {}
+    if is_traced_from_lights and specular:
+        aim = bounding_sphere((np.concatenate(specular) - centre) * scale)
+    scene = {"type": "scene", "sensor": sensor(camera, (camera.position - centre) * scale, scale, resolution)}
+    for number, light in enumerate(lights):
+        if light.range and is_traced_from_lights:
+            raise gltf.Unsupported(f"light «{light.name}» has a range, which isn't supported with --light-tracing")
+        scene[f"light{number}"] = punctual(light, (light.position - centre) * scale, scale)
+    if environment:
+        scene["environment"] = surroundings(environment)
+    has_media = False
     with tempfile.TemporaryDirectory() as folder:
         for number, mesh in enumerate(meshes):
-            file = Path(folder) / f"{number}.ply"
-            write_ply(file, mesh, (mesh.positions - centre) * scale)
             material = mesh.material
-            is_black = material.kind != "matte" and not has_specular
-            scene[f"mesh{number}"] = {
-                "type": "ply",
-                "filename": str(file),
-                "bsdf": {"type": "twosided", "bsdf": BLACK} if is_black else bsdf(material),
-            }
-            if max(material.emission) > 0:
-                scene[f"mesh{number}"]["emitter"] = lamp(material, aim)
+            look = Look(material, mesh)
+            file = Path(folder) / f"{number}.ply"
+            write_ply(file, mesh, (mesh.positions - centre) * scale, look.set)
+            shape = {"type": "ply", "filename": str(file)}
+            shape["bsdf"] = BLACK if material.is_specular() and not has_specular else bsdf(look)
+            if material.has_emission():
+                shape["emitter"] = {"type": "lamp", "look": look.number, **aim}
+            has_media |= look.is_see_through() or (material.is_clear() and material.is_thin and material.is_smooth())
+            if material.is_solid() and max(material.absorption) > 0:
+                has_media = True
+                most = max(material.absorption)
+                shape["interior"] = {
+                    "type": "homogeneous",
+                    "albedo": {"type": "rgb", "value": 0.0},
+                    "sigma_t": {"type": "rgb", "value": [value / most for value in material.absorption]},
+                    "scale": most / scale,
+                }
+            loaded = mi.load_dict(shape, optimize=False)
+            look.add_attributes(loaded, mesh)
+            scene[f"mesh{number}"] = loaded
         # Optimised, lights that are alike become one, which can't belong to several shapes.
-        return mi.load_dict(scene, optimize=False)
+        return mi.load_dict(scene, optimize=False), has_media
+
+
+def sensor(camera, position, scale, resolution):
+    width, height = resolution
+    to_world = mi.ScalarTransform4f().look_at(
+        origin=position.tolist(), target=(position + camera.forward).tolist(), up=camera.up.tolist()
+    )
+    lens = {"type": "perspective", "fov_axis": "y", "fov": float(np.degrees(camera.yfov or 1)), "to_world": to_world}
+    if camera.ymag:
+        # Mitsuba's shows two units of width.
+        half = float(camera.ymag * scale * width / height)
+        lens = {"type": "orthographic", "to_world": to_world @ mi.ScalarTransform4f().scale([half, half, 1])}
+    return {
+        **lens,
+        "near_clip": 1e-4,
+        "far_clip": 1e4,
+        "film": {
+            "type": "hdrfilm",
+            "width": width,
+            "height": height,
+            "pixel_format": "rgb",
+            "component_format": "float32",
+            "rfilter": {"type": "box"},
+        },
+        "sampler": {"type": "independent"},
+    }
+
+
+def punctual(light, position, scale):
+    if light.kind == "directional":
+        irradiance = {"type": "rgb", "value": light.intensity.tolist()}
+        return {"type": "directional", "direction": light.direction.tolist(), "irradiance": irradiance}
+    return {
+        "type": "punctual",
+        "position": mi.ScalarPoint3f(position),
+        "direction": mi.ScalarVector3f(light.direction),
+        "intensity": mi.ScalarColor3f(light.intensity * scale**2),
+        "is_spot": light.kind == "spot",
+        "inner": float(light.cosines[0]),
+        "outer": float(light.cosines[1]),
+        "range": float((light.range or 0) * scale),
+    }
+
+
+def surroundings(environment):
+    if isinstance(environment, tuple):
+        return {"type": "constant", "radiance": {"type": "rgb", "value": list(environment)}}
+    # Upper edge +Y, centre +Z, -X to the right of it: as ppm-vk has it.
+    return {"type": "envmap", "filename": str(environment)}
 
 
 def bounding_sphere(points):
@@ -203,54 +278,12 @@ def bounding_sphere(points):
     return {"centre": mi.ScalarPoint3f(centre), "radius": float(radius)}
 
 
-def lamp(material, aim):
-    if not material.double_sided and not aim:
-        return {"type": "area", "radiance": {"type": "rgb", "value": list(material.emission)}}
-    radiance = mi.ScalarColor3f(material.emission)
-    return {"type": "lamp", "radiance": radiance, "double_sided": material.double_sided, **aim}
-
-
-def bsdf(material):
-    color = list(material.base_color)
-    if material.kind == "mirror":
-        return {"type": "schlick_mirror", "f0": mi.ScalarColor3f(color)}
-    if material.kind == "glass":
-        return {
-            "type": "dielectric",
-            "int_ior": float(material.ior),
-            "ext_ior": 1.0,
-            "specular_transmittance": {"type": "rgb", "value": color},
-        }
-    reflectance = {"type": "rgb", "value": color}
-    if material.texture:
-        reflectance = texture(material.texture, color)
-    # In glTF doubleSided tells which sides are shown and emit; a ray tracer's surfaces reflect on both.
-    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
-
-
-def texture(of, factor):
-    if of.wrap[0] != of.wrap[1]:
-        raise gltf.Unsupported("a texture that wraps differently in u and v isn't supported")
-    stream = mi.MemoryStream()
-    stream.write(of.data)
-    stream.seek(0)
-    bitmap = mi.Bitmap(stream)
-    linear = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
-    return {
-        "type": "bitmap",
-        "bitmap": mi.Bitmap(np.array(linear) * np.array(factor, np.float32)),
-        "raw": True,
-        "filter_type": "nearest" if of.nearest else "bilinear",
-        "wrap_mode": of.wrap[0],
-    }
-
-
-def write_ply(file, mesh, positions):
+def write_ply(file, mesh, positions, texture_set):
     names = ["x", "y", "z", "nx", "ny", "nz"]
     columns = [positions, mesh.normals]
-    if mesh.texcoords is not None:
+    if mesh.texcoords:
         names += ["u", "v"]
-        columns.append(mesh.texcoords)
+        columns.append(mesh.texcoords[texture_set])
     vertices = np.concatenate(columns, axis=2).reshape(-1, len(names)).astype("<f4")
     faces = np.zeros(len(positions), dtype=[("count", "u1"), ("corners", "<u4", 3)])
     faces["count"] = 3

@@ -11,7 +11,7 @@ use super::dispersion::disperse;
 use super::environment::Environment;
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
 use super::intersect::{PlacedTriangle, Ray};
-use super::light::{emits, emitted_radiance};
+use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
 use super::random::{PathKind, Random};
 use super::sampling::{disc_point, encode_direction};
 use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface};
@@ -20,7 +20,7 @@ use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{BACK_HIDDEN, Gloss, NO_OBJECT, VisiblePoint};
+use crate::layout::{BACK_HIDDEN, Gloss, Light, NO_OBJECT, VisiblePoint};
 
 /// What is left of a path that splits.
 #[derive(Clone, Copy)]
@@ -63,6 +63,40 @@ fn glimpse(
     } else {
         (DVec3::ZERO, dark)
     }
+}
+
+/// What a narrow reflection shows of the lights without extent, which no direction of it meets.
+fn glint(
+    inputs: &Inputs<'_>,
+    surface: &Surface,
+    facing: &Facing,
+    reflector: &Reflector,
+    viewer: DVec3,
+    random: &mut Random,
+) -> DVec3 {
+    let [u, first_digits, second_digits, _] = random.next4();
+    let lights = &inputs.scene.lights;
+    let chosen = choose_light(lights, u, [first_digits, second_digits]).light;
+    let of_one = inputs.settings.slots_per_pixel == 1;
+    let asked = if of_one { std::slice::from_ref(chosen) } else { lights };
+    let origin = surface.origin_towards(facing.geometric_normal);
+    let boundary = Reflector {
+        diffuse: DVec3::ZERO,
+        ..*reflector
+    };
+    let from = |light: &Light| {
+        let Arriving { ray, end, irradiance } = arriving_from(light, origin);
+        let direction = ray.normalize();
+        let cosine = direction.dot(facing.shading_normal);
+        let faces = cosine > 0.0 && direction.dot(facing.geometric_normal) > 0.0 && irradiance.max_element() > 0.0;
+        let ray = Ray { origin, direction: ray };
+        if !faces || nearest_visible(inputs, ray, end, None, random).is_some() {
+            return DVec3::ZERO;
+        }
+        let probability = if of_one { f64::from(light.probability) } else { 1.0 };
+        boundary.brdf(facing.shading_normal, viewer, direction) * irradiance * (cosine / probability)
+    };
+    asked.iter().filter(|light| is_punctual(light)).map(from).sum()
 }
 
 /// Visible points, in slot order: as many for each pixel slot as
@@ -254,6 +288,10 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             branch.ignored = Some(surface.triangle);
             let [choice, second, third, _] = random.next4();
             if is_glossy {
+                if inputs.scene.features.punctual && !reflector.is_smooth() {
+                    let seen = glint(inputs, &surface, &facing, &reflector, -incoming, &mut random);
+                    branch.emitted += branch.throughput * seen;
+                }
                 let p = reflector.reflection_probability(-incoming.dot(facing.shading_normal));
                 let (direction, weight) = facing.follow(&reflector, incoming, [second, third]);
                 let reflected = Branch {

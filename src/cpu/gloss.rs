@@ -4,6 +4,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use half::f16;
+
 use super::sampling::{basis, decode_direction, encode_direction};
 use super::vector::{rgb, with_word, word, xyz};
 use crate::layout::{Gloss, Material};
@@ -12,6 +14,10 @@ use crate::layout::{Gloss, Material};
 pub const SMOOTH_ALPHA: f64 = 1e-3;
 /// Below this α camera paths follow reflections.
 pub(super) const FOLLOWED_ALPHA: f64 = 0.1;
+
+fn schlick(cosine: f64) -> f64 {
+    (1.0 - cosine).clamp(0.0, 1.0).powi(5)
+}
 
 /// A Lambertian base under a boundary of microfacets. `v` and `l` are unit vectors to the viewer and to the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +28,8 @@ pub struct Reflector {
     pub f0: DVec3,
     /// At grazing incidence.
     pub f90: f64,
+    /// The largest channel of what reflects over the base, at normal and at grazing incidence.
+    pub over_base: [f64; 2],
     /// GGX's α.
     pub alpha: f64,
     /// What lies above both: how much of a dielectric's reflection it has.
@@ -33,7 +41,7 @@ pub(super) const COAT_F0: f64 = 0.04;
 
 /// What a coat lets through to what lies below.
 pub fn coat_passes(coat: f64, cosine: f64) -> f64 {
-    1.0 - coat * (COAT_F0 + (1.0 - COAT_F0) * (1.0 - cosine).clamp(0.0, 1.0).powi(5))
+    1.0 - coat * (COAT_F0 + (1.0 - COAT_F0) * schlick(cosine))
 }
 
 impl Reflector {
@@ -44,6 +52,10 @@ impl Reflector {
             diffuse: base * (1.0 - metallic),
             f0: rgb(material.specular_f0).lerp(base, metallic),
             f90: f64::from(material.specular_f90) * (1.0 - metallic) + metallic,
+            over_base: [
+                rgb(material.specular_f0).max_element(),
+                f64::from(material.specular_f90),
+            ],
             alpha: f64::from(material.roughness).powi(2),
             coat: f64::from(material.coat),
         }
@@ -55,6 +67,7 @@ impl Reflector {
             diffuse: albedo,
             f0: DVec3::ZERO,
             f90: 0.0,
+            over_base: [0.0; 2],
             alpha: 0.0,
             coat: 0.0,
         }
@@ -67,30 +80,45 @@ impl Reflector {
 
     /// What a visible point keeps, and the direction to the viewer.
     pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
-        let rest = word(gloss.f0_rest);
-        let part = |shift: u32| f64::from(rest >> shift & 1023) / 1023.0;
+        let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
+        let [f0_rg, f0_b_f90, alpha_coat, over_base] = gloss.rest.map(|word| [half(word), half(word >> 16)]);
         let reflector = Self {
             diffuse: xyz(gloss.diffuse_viewer),
-            f0: xyz(gloss.f0_rest),
-            f90: part(12),
-            alpha: (f64::from(rest & 4095) / 4095.0).powi(2),
-            coat: part(22),
+            f0: DVec3::new(f0_rg[0], f0_rg[1], f0_b_f90[0]),
+            f90: f0_b_f90[1],
+            over_base,
+            alpha: alpha_coat[0],
+            coat: alpha_coat[1],
         };
         (reflector, decode_direction(word(gloss.diffuse_viewer)))
     }
 
     pub(super) fn to_gloss(self, v: DVec3) -> Gloss {
-        let part = |value: f64| (value * 1023.0).round() as u32;
-        let rest = (self.alpha.sqrt() * 4095.0).round() as u32 | part(self.f90) << 12 | part(self.coat) << 22;
+        let halves = |[low, high]: [f64; 2]| {
+            let half = |value: f64| u32::from(f16::from_f64(value).to_bits());
+            half(low) | half(high) << 16
+        };
+        let rest = [
+            [self.f0.x, self.f0.y],
+            [self.f0.z, self.f90],
+            [self.alpha, self.coat],
+            self.over_base,
+        ];
         Gloss {
             diffuse_viewer: with_word(self.diffuse, encode_direction(v)),
-            f0_rest: with_word(self.f0, rest),
+            rest: rest.map(halves),
         }
     }
 
     /// Reflectance of the boundary.
     pub fn fresnel(&self, cosine: f64) -> DVec3 {
-        self.f0 + (DVec3::splat(self.f90) - self.f0) * (1.0 - cosine).clamp(0.0, 1.0).powi(5)
+        self.f0 + (DVec3::splat(self.f90) - self.f0) * schlick(cosine)
+    }
+
+    /// What gets through to the base, alike for all colours (`KHR_materials_specular`), and past what isn't metal alone.
+    fn through_to_base(&self, cosine: f64) -> f64 {
+        let [normal, grazing] = self.over_base;
+        1.0 - (normal + (grazing - normal) * schlick(cosine))
     }
 
     pub(super) fn is_smooth(&self) -> bool {
@@ -116,7 +144,7 @@ impl Reflector {
         let h = (v + l).normalize();
         let f = self.fresnel(v.dot(h));
         let passes = coat_passes(self.coat, v.dot(h));
-        let base = (1.0 - f) * self.diffuse / PI;
+        let base = self.through_to_base(v.dot(h)) * self.diffuse / PI;
         if self.is_smooth() {
             return passes * base;
         }

@@ -95,6 +95,7 @@ fn a_coated_plate_in_uniform_light_shows_its_coat_and_its_base() {
         diffuse: DVec3::ZERO,
         f0: DVec3::ZERO,
         f90: 0.0,
+        over_base: [0.0; 2],
         alpha: 1.0,
         coat: 0.0,
     };
@@ -112,6 +113,7 @@ fn a_coated_plate_in_uniform_light_shows_its_coat_and_its_base() {
             diffuse: DVec3::ZERO,
             f0: DVec3::splat(0.04 * factor),
             f90: factor,
+            over_base: [0.0; 2],
             alpha: roughness * roughness,
             coat: 0.0,
         };

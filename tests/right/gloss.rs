@@ -20,6 +20,7 @@ pub fn metal(alpha: f64) -> Reflector {
         diffuse: DVec3::ZERO,
         f0: dvec3(0.95, 0.64, 0.3),
         f90: 1.0,
+        over_base: [0.0; 2],
         alpha,
         coat: 0.0,
     }
@@ -30,6 +31,7 @@ pub fn plastic(alpha: f64) -> Reflector {
         diffuse: dvec3(0.8, 0.5, 0.1),
         f0: DVec3::splat(0.04),
         f90: 1.0,
+        over_base: [0.04, 1.0],
         alpha,
         coat: 0.0,
     }
@@ -233,6 +235,39 @@ fn a_glossy_plate_in_uniform_light_shows_its_albedo() {
             let what = format!("metallic {metallic}, roughness {roughness}, direct light by {direct:?}");
             measured[0].assert_between(expected * 0.999, expected * 1.001, &what);
         }
+    }
+}
+
+/// KHR_materials_specular: max_value(fr) is what a coloured reflection takes from all channels of the base, so that it doesn't
+/// show in the complementary colour; and appendix B mixes the BRDFs of metal and dielectric, each with its own Fresnel.
+#[test]
+fn a_base_lies_under_the_largest_channel_of_what_is_no_metal() {
+    let (specular, metallic, color) = (0.8, 0.25, dvec3(0.9, 0.6, 0.3));
+    let f0 = specular * dvec3(0.3, 0.1, 0.0);
+    let reflector = Reflector {
+        diffuse: color * (1.0 - metallic),
+        f0: f0.lerp(color, metallic),
+        f90: specular * (1.0 - metallic) + metallic,
+        over_base: [0.24, specular],
+        alpha: 0.0,
+        coat: 0.0,
+    };
+    for cosine in COSINES {
+        let l = dvec3(-viewer(cosine).x, 0.0, cosine);
+        let weight = (1.0 - cosine).powi(5);
+        let of_dielectric = 0.24 + (specular - 0.24) * weight;
+        let expected = (1.0 - metallic) * (1.0 - of_dielectric) * color / PI;
+        let found = reflector.brdf(DVec3::Z, viewer(cosine), l);
+        assert!(
+            (found - expected).abs().max_element() < 1e-12,
+            "{found} instead of {expected}"
+        );
+        let boundary = (f0 + (specular - f0) * weight) * (1.0 - metallic) + (color + (1.0 - color) * weight) * metallic;
+        let found = reflector.fresnel(cosine);
+        assert!(
+            (found - boundary).abs().max_element() < 1e-12,
+            "{found} instead of {boundary}"
+        );
     }
 }
 

@@ -3,18 +3,19 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
 use glam::DVec3;
-use ppm_vk::config::{Direct, RenderConfig};
+use ppm_vk::config::{Direct, Estimator, RenderConfig};
+use ppm_vk::cpu::Reflector;
 use ppm_vk::film::Image;
 use ppm_vk::metrics::compare;
 use ppm_vk::scene::Environment;
 use serde_json::{Value, json};
 
-use crate::document::{Document, clear, light, matte, mirror};
+use crate::document::{Document, clear, light, matte, metallic_roughness, mirror};
 use crate::lamp::{SIDE, assert_floor_is_lit_by, config};
 use crate::measure::{Region, measure};
 use crate::mesh::Mesh;
 use crate::picture::Subject;
-use crate::stage::{mean_on_floor, subject, subject_under, walls};
+use crate::stage::{camera_ray, mean_on_floor, subject, subject_under, walls};
 
 const ALBEDO: f64 = 0.5;
 const BLACK: [f64; 3] = [0.0; 3];
@@ -85,6 +86,67 @@ fn a_directional_light_brings_its_lux_times_the_cosine() {
         FRAC_PI_6 - FRAC_PI_2,
     );
     assert_lit(&scene, 0.1, |_| 5.0 * FRAC_PI_6.cos());
+}
+
+/// Camera paths follow so narrow a reflection, and no direction of theirs meets a point.
+#[test]
+fn polished_metal_shows_the_highlight_of_a_point() {
+    const ROUGHNESS: f64 = 0.25;
+    const F0: [f64; 3] = [0.9, 0.6, 0.3];
+    let mut scene = Document::new("highlight");
+    let metal = scene.material(metallic_roughness("metal", F0, 1.0, ROUGHNESS));
+    let black = scene.material(matte("black", BLACK));
+    scene.object("floor", &Mesh::facing_up(1.5, 0.0), metal);
+    // A light beside the punctual one, to choose between.
+    scene.object("dark", &Mesh::facing_down(0.1, 2.0), black);
+    let place = DVec3::new(0.2, 1.5, -1.4);
+    let lamp = json!({"type": "point", "intensity": 20});
+    scene.punctual(lamp).at(place.to_array());
+    scene
+        .punctual(json!({"type": "directional", "intensity": 3}))
+        .rotated([1.0, 0.0, 0.0], -0.8);
+    scene.camera([1.2, 1.2], [0.0, 0.0], 40.0);
+    let scene = subject(scene);
+    let reflector = Reflector {
+        diffuse: DVec3::ZERO,
+        f0: F0.into(),
+        f90: 1.0,
+        over_base: [0.0; 2],
+        coat: 0.0,
+        alpha: ROUGHNESS * ROUGHNESS,
+    };
+    let sun = DVec3::new(0.0, 0.8_f64.sin(), 0.8_f64.cos());
+    let radiance = |point: DVec3| {
+        let v = (DVec3::new(0.0, 1.2, 1.2) - point).normalize();
+        let to_lamp = place - point;
+        let l = to_lamp.normalize();
+        let by_lamp = reflector.brdf(DVec3::Y, v, l) * (20.0 * l.y / to_lamp.length_squared());
+        by_lamp + reflector.brdf(DVec3::Y, v, sun) * 3.0 * sun.y
+    };
+    let regions = [Region::around([24, 24], 4), Region::around([24, 24], 16)];
+    for (estimator, iterations) in [(Estimator::Sppm, 128), (Estimator::Ppm, 32)] {
+        let settings = RenderConfig {
+            estimator,
+            ..config(Direct::Light, 100, 0.1)
+        };
+        let found = measure(&scene, settings, iterations, |image| {
+            let read = |region: &Region| [0, 1, 2].map(|channel| region.of(image, channel));
+            regions.iter().flat_map(read).collect()
+        });
+        for (index, found) in found.iter().enumerate() {
+            let region = &regions[index / 3];
+            let exact = region.mean(|pixel| match estimator {
+                Estimator::Sppm => mean_on_floor(&scene, SIDE, pixel, |point| radiance(point)[index % 3]),
+                Estimator::Ppm => {
+                    let (origin, direction) = camera_ray(&scene, SIDE, pixel.map(|at| at as f64 + 0.5));
+                    radiance(origin - direction * (origin.y / direction.y))[index % 3]
+                }
+            });
+            let what = format!("{estimator:?}, {region:?}, channel {}", index % 3);
+            // Sixteen places a pixel stand for its mean.
+            found.assert_between(exact * 0.9995, exact * 1.0005, &what);
+        }
+    }
 }
 
 /// Straight light by a ray, and what a mirror above the light sends down by photons: no ray finds the light there. The floor's

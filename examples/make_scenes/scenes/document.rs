@@ -130,6 +130,7 @@ pub struct Document {
     images: Vec<Value>,
     textures: Vec<Value>,
     buffer: Vec<u8>,
+    transforms: bool,
 }
 
 impl Document {
@@ -147,11 +148,13 @@ impl Document {
             images: Vec::new(),
             textures: Vec::new(),
             buffer: Vec::new(),
+            transforms: false,
         }
     }
 
     /// Adds a material and returns its index.
     pub fn material(&mut self, material: Value) -> usize {
+        self.transforms |= material.to_string().contains("KHR_texture_transform");
         push(&mut self.materials, material)
     }
 
@@ -173,6 +176,10 @@ impl Document {
         let mut attributes = json!({ "POSITION": self.vertex_data(&positions), "NORMAL": self.vertex_data(&normals) });
         if !texcoords.is_empty() {
             attributes["TEXCOORD_0"] = json!(self.vertex_data(&texcoords));
+        }
+        let colors: Vec<_> = mesh.colors.iter().map(|color| color.as_vec3().to_array()).collect();
+        if !colors.is_empty() {
+            attributes["COLOR_0"] = json!(self.vertex_data(&colors));
         }
         let primitive = json!({
             "attributes": attributes,
@@ -208,6 +215,17 @@ impl Document {
             "zfar": 1000.0,
         });
         let camera = json!({ "name": "camera", "type": "perspective", "perspective": perspective });
+        self.place_camera(camera, eye, target);
+    }
+
+    /// The same without perspective, which shows so much of either side of `target`.
+    pub fn parallel_camera(&mut self, eye: [f64; 2], target: [f64; 2], half_side: f64) {
+        let lens = json!({ "xmag": half_side, "ymag": half_side, "znear": 0.01, "zfar": 1000.0 });
+        let camera = json!({ "name": "camera", "type": "orthographic", "orthographic": lens });
+        self.place_camera(camera, eye, target);
+    }
+
+    fn place_camera(&mut self, camera: Value, eye: [f64; 2], target: [f64; 2]) {
         let camera = push(&mut self.cameras, camera);
         let pitch = (target[0] - eye[0]).atan2(eye[1] - target[1]);
         let mut node = self.node(json!({ "name": "camera", "camera": camera }));
@@ -236,6 +254,9 @@ impl Document {
             children.flatten().any(|child| *child == json!(node))
         };
         let roots: Vec<usize> = (0..self.nodes.len()).filter(|&node| !is_child(node)).collect();
+        if self.transforms {
+            extensions.insert("KHR_texture_transform");
+        }
         let binary = format!("{}.bin", self.name);
         let mut document = json!({
             "asset": { "version": "2.0", "generator": "ppm-vk make_scenes", "copyright": "CC0-1.0" },

@@ -12,6 +12,8 @@ pub struct Mesh {
     pub normals: Vec<DVec3>,
     /// Texture coordinates; empty where there are none.
     pub texcoords: Vec<DVec2>,
+    /// Colours, linear; empty where there are none.
+    pub colors: Vec<DVec3>,
     pub triangles: Vec<[u16; 3]>,
 }
 
@@ -164,8 +166,40 @@ impl Mesh {
             positions: points.iter().map(|&point| point * radius).collect(),
             normals: points,
             texcoords: Vec::new(),
+            colors: Vec::new(),
             triangles,
         }
+    }
+
+    /// The wall of a column around the y axis, seen from outside; the texture goes round it `times`.
+    pub fn column(radius: f64, height: f64, segments: u16, times: f64) -> Self {
+        let mut mesh = Self::default();
+        for y in [0.0, height] {
+            for step in 0..=segments {
+                let part = f64::from(step) / f64::from(segments);
+                let (sin, cos) = (TAU * part).sin_cos();
+                let normal = dvec3(sin, 0.0, cos);
+                mesh.vertex(radius * normal + y * DVec3::Y, normal);
+                mesh.texcoords.push(dvec2(times * part, 1.0 - y / height));
+            }
+        }
+        mesh.push_strip(0, segments + 1, segments, false);
+        mesh
+    }
+
+    /// A horizontal square that faces up, of `cells` × `cells` cells, coloured at their corners by x and z.
+    pub fn colored(half_side: f64, cells: u16, color: impl Fn(f64, f64) -> DVec3) -> Self {
+        let along = |step: u16| -half_side + 2.0 * half_side * f64::from(step) / f64::from(cells);
+        let row = cells + 1;
+        let mut mesh = Self::default();
+        for (z, x) in (0..row).flat_map(|z| (0..row).map(move |x| (along(z), along(x)))) {
+            mesh.vertex(dvec3(x, 0.0, z), DVec3::Y);
+            mesh.colors.push(color(x, z));
+        }
+        for z in 0..cells {
+            mesh.push_strip(z * row, (z + 1) * row, cells, true);
+        }
+        mesh
     }
 
     /// A ring around the y axis with a rectangular section from `inner` to `outer` radius and `bottom` to `top`.

@@ -1,12 +1,11 @@
 //! The project's own scenes. Units are metres, y is up; radiance is linear RGB.
 
 mod document;
+mod known;
 mod mesh;
 mod spheres;
 
-use document::{
-    Document, File, Filter, clear, emitting, light, matte, metallic_roughness, mirror, one_sided, png, with_texture,
-};
+use document::{Document, File, Filter, clear, glass, light, matte, metallic_roughness, mirror, png, with_texture};
 use glam::{DVec3, dvec2, dvec3};
 use mesh::Mesh;
 use serde_json::json;
@@ -30,12 +29,13 @@ pub fn all() -> Vec<File> {
         ring(),
         pool("pool", false),
         pool("pool-tiles", true),
-        furnace_diffuse(),
-        furnace_specular(),
-        furnace_closed(),
-        light_area(),
+        known::furnace_diffuse(),
+        known::furnace_specular(),
+        known::furnace_closed(),
+        known::light_area(),
         lights(),
-        slab(),
+        plaza(),
+        known::slab(),
     ]
     .into_iter()
     .flat_map(Document::finish)
@@ -267,53 +267,6 @@ fn textures() -> Document {
     scene
 }
 
-/// A grey sphere in a box of radiance 1.
-fn furnace_diffuse() -> Document {
-    let mut scene = furnace("furnace-diffuse");
-    let grey = scene.material(one_sided(matte("grey", [0.5; 3])));
-    scene.object("diffuse", &Mesh::icosphere(0.5, 4), grey);
-    scene.camera([0.0, 2.9], [0.0, 0.0], 60.0);
-    scene
-}
-
-/// A glass and a mirror sphere, neither of which absorbs, in a box of radiance 1.
-fn furnace_specular() -> Document {
-    let mut scene = furnace("furnace-specular");
-    let glass = scene.material(clear("glass", 1.5));
-    let mirror = scene.material(mirror("mirror", [1.0; 3]));
-    let sphere = Mesh::icosphere(0.5, 4);
-    scene.object("glass", &sphere, glass).at([-0.7, 0.0, 0.0]);
-    scene.object("mirror", &sphere, mirror).at([0.7, 0.0, 0.0]);
-    scene.camera([0.0, 2.9], [0.0, 0.0], 60.0);
-    scene
-}
-
-/// A closed matte room whose six sides emit Le and reflect ρ: radiance is Le / (1 − ρ) everywhere.
-fn furnace_closed() -> Document {
-    const ALBEDO: [f64; 3] = [0.2, 0.5, 0.8];
-    const EMISSION: [f64; 3] = [1.0; 3];
-    let mut scene = Document::new("furnace-closed");
-    let wall = scene.material(emitting(matte("wall", ALBEDO), EMISSION));
-    scene.object("floor", &Mesh::facing_up(ROOM, 0.0), wall);
-    for (name, mesh) in walls(2.0) {
-        scene.object(name, &mesh, wall);
-    }
-    scene.object("ceiling", &Mesh::facing_down(ROOM, 2.0), wall);
-    scene.camera([1.0, 0.9], [1.0, 0.0], 90.0);
-    scene
-}
-
-/// A square light above a floor, for which irradiance has a closed form.
-fn light_area() -> Document {
-    let mut scene = Document::new("light-area");
-    let grey = scene.material(matte("grey", [0.5; 3]));
-    let lamp = scene.material(light("light", [10.0, 5.0, 2.5]));
-    scene.object("floor", &Mesh::facing_up(2.0, 0.0), grey);
-    scene.object("light", &Mesh::facing_down(0.5, 2.0), lamp);
-    scene.camera([1.8, 1.8], [0.0, 0.0], 40.0);
-    scene
-}
-
 /// A glass and a matte sphere under a lamp, a spotlight and the sun, none of which has an extent.
 fn lights() -> Document {
     let mut scene = Document::new("lights");
@@ -336,23 +289,52 @@ fn lights() -> Document {
     scene
 }
 
-/// A black room with a luminous ceiling and a grey floor, part of which lies under water.
-fn slab() -> Document {
-    const HEIGHT: f64 = 2.0;
-    let mut scene = Document::new("slab");
-    let grey = scene.material(matte("grey", [0.5; 3]));
-    let black = scene.material(matte("black", BLACK));
-    let lamp = scene.material(light("light", [1.0; 3]));
-    let water = scene.material(clear("water", 1.33));
-    scene.object("floor", &Mesh::facing_up(ROOM, 0.0), grey);
-    for (name, wall) in walls(HEIGHT) {
-        scene.object(name, &wall, black);
+/// Things under punctual lights, seen without perspective: enamel with a coloured reflection, an alloy, polished metal, a studded
+/// column, a thin frosted pane, ground with colours at its corners. Nothing there is smooth: a path tracer finds all light.
+fn plaza() -> Document {
+    let mut scene = Document::new("plaza");
+    let ground = scene.material(matte("ground", [0.8; 3]));
+    let color = |x: f64, z: f64| dvec3(0.5 + 0.4 * (2.0 * x).sin(), 0.5 + 0.4 * (2.0 * z).cos(), 0.4);
+    scene.object("ground", &Mesh::colored(2.0, 16, color), ground);
+    let mut enamel = metallic_roughness("enamel", [0.5, 0.5, 0.6], 0.0, 0.4);
+    enamel["extensions"] = json!({
+        "KHR_materials_ior": { "ior": 2.2 },
+        "KHR_materials_specular": { "specularFactor": 0.9, "specularColorFactor": [2.5, 0.8, 0.2] },
+    });
+    let sphere = Mesh::icosphere(0.4, 4);
+    let polished = metallic_roughness("polished", [0.95, 0.8, 0.5], 1.0, 0.25);
+    let alloy = metallic_roughness("alloy", [0.3, 0.5, 0.8], 0.5, 0.4);
+    for (material, [x, z]) in [(enamel, [-1.1, 0.5]), (polished, [0.0, 0.9]), (alloy, [1.1, 0.5])] {
+        let material = scene.material(material);
+        scene.object("sphere", &sphere, material).at([x, 0.4005, z]);
     }
-    scene.object("ceiling", &Mesh::facing_down(ROOM, HEIGHT), lamp);
-    let reach = ROOM + 0.03;
-    let body = Mesh::cuboid(dvec3(-0.5, -0.03, -reach), dvec3(reach, 0.4, reach));
-    scene.object("water", &body, water);
-    scene.camera([1.7, 0.6], [0.2, 0.0], 60.0);
+    let studs = scene.texture(&stud_png(), Filter::Linear);
+    let studded = metallic_roughness("studded", [0.8, 0.7, 0.6], 0.0, 0.5);
+    let mut studded = with_texture(studded, "/normalTexture", studs);
+    studded["normalTexture"]["extensions"] =
+        json!({ "KHR_texture_transform": { "scale": [1.0, 2.0], "offset": [0.1, 0.2], "rotation": 0.3 } });
+    let studded = scene.material(studded);
+    let column = Mesh::column(0.5, 1.5, 24, 6.0);
+    scene.object("column", &column, studded).at([-0.5, 0.001, -0.7]);
+    let mut pane = glass("pane", 0.4, 0.8, None);
+    pane["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.9, 0.6, 0.3, 1.0]);
+    let pane = scene.material(pane);
+    let square = [[-0.5, 0.0], [0.5, 0.0], [0.5, 1.2], [-0.5, 1.2]].map(|[x, y]| dvec3(x, y, 0.0));
+    scene
+        .object("pane", &Mesh::quad(square), pane)
+        .at([0.9, 0.002, -0.5])
+        .rotated([0.0, 1.0, 0.0], -0.5);
+    let lamp = json!({ "name": "lamp", "type": "point", "color": [1.0, 0.7, 0.4], "intensity": 4.0, "range": 3.0 });
+    scene.punctual(lamp).at([0.6, 1.4, 1.4]);
+    let cone = json!({ "innerConeAngle": 0.2, "outerConeAngle": 0.6 });
+    let spot = json!({ "name": "spot", "type": "spot", "color": [0.5, 0.8, 1.0], "intensity": 20.0, "spot": cone });
+    let down = -FRAC_PI_2;
+    scene.punctual(spot).at([-0.8, 2.5, 0.4]).rotated([1.0, 0.0, 0.0], down);
+    let sun = json!({ "name": "sun", "type": "directional", "intensity": 1.2 });
+    scene
+        .punctual(sun)
+        .rotated(dvec3(-1.0, 0.8, 0.0).normalize().to_array(), 0.8);
+    scene.parallel_camera([2.5, 4.0], [0.5, 0.0], 1.7);
     scene
 }
 
@@ -371,15 +353,6 @@ fn cornell_room(name: &'static str) -> Document {
         scene.object(name, &wall, material);
     }
     scene.object("light", &Mesh::facing_down(0.25, HEIGHT - 0.002), lamp);
-    scene
-}
-
-/// A box of 6 m with walls of radiance 1 that reflect nothing.
-fn furnace(name: &'static str) -> Document {
-    let mut scene = Document::new(name);
-    let environment = scene.material(light("env", [1.0; 3]));
-    let walls = Mesh::cuboid(DVec3::splat(-3.0), DVec3::splat(3.0)).flipped();
-    scene.object("env", &walls, environment);
     scene
 }
 
