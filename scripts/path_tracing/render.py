@@ -57,7 +57,7 @@ class Paths(Part):
         super().__init__(name, pixels, np.prod(scene.sensors()[0].film().size()))
         self.scene = scene
         self.without = without
-        kind = "volpath" if has_media else "path"
+        kind = "volpathmis" if has_media else "path"
         self.integrator = mi.load_dict({"type": kind, "max_depth": -1, "rr_depth": ROULETTE_DEPTH})
         # Two passes are the least.
         self.samples = int(np.clip(LANES // max(len(pixels), 1), 1, np.ceil(spp / 2)))
