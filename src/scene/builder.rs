@@ -37,7 +37,9 @@ pub(super) struct Builder {
     pub zero_normals: usize,
     /// Texture coordinates, colours and tangents that weren't finite and were left out.
     pub not_finite: usize,
-    /// Triangles that instances share, by mesh and primitive.
+    /// Whether instances share triangles.
+    pub shares: bool,
+    /// Triangles that they share, by mesh and primitive.
     pub shared: HashMap<(usize, usize), Shared>,
     /// For each vertex of the primitive in hand, its index in the scene, or [`UNSEEN`]. Kept between primitives, and
     /// cleared only where it was written: many primitives may use small parts of one large accessor.
@@ -48,7 +50,7 @@ pub(super) struct Builder {
 
 impl Builder {
     /// A builder that has no objects yet.
-    pub(super) fn new(normalisation: Normalisation) -> Self {
+    pub(super) fn new(normalisation: Normalisation, shares: bool) -> Self {
         Self {
             geometry: Geometry {
                 positions: Vec::new(),
@@ -63,6 +65,7 @@ impl Builder {
             },
             zero_normals: 0,
             not_finite: 0,
+            shares,
             shared: HashMap::new(),
             scene_vertices: Vec::new(),
             seen: Vec::new(),

@@ -1,6 +1,8 @@
 //! Finds where dielectrics touch other objects. Rounding decides which of two faces in one place a ray meets first, and the
 //! step off the one would take it past the other: the kernels look for the other face where a triangle is marked.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -37,20 +39,19 @@ pub(super) fn touched(
         .map(|(triangle, face)| is_dielectric(triangle) && face.touches_any(&scene))
         .collect();
     touched.resize(triangles.len(), false);
-    for instance in instances {
-        let placed = instances
-            .iter()
-            .filter(|other| other.first_triangle == instance.first_triangle);
-        let is_first = placed.clone().next() == Some(instance);
-        let (first, count) = (instance.first_triangle as usize, instance.triangle_count as usize);
-        if !is_first || !is_dielectric(&triangles[first]) {
+    let mut placed: BTreeMap<(usize, usize), Vec<&Place>> = BTreeMap::new();
+    for (instance, place) in instances.iter().zip(&scene.places) {
+        let shared = (instance.first_triangle as usize, instance.triangle_count as usize);
+        placed.entry(shared).or_default().push(place);
+    }
+    for ((first, count), places) in placed {
+        if !is_dielectric(&triangles[first]) {
             continue;
         }
-        let places: Vec<Place> = placed.map(Place::new).collect();
         let all = places.len() * count > MOST_PLACED;
         let triangles = touched[first..first + count].par_iter_mut().zip(&triangles[first..]);
         triangles.for_each(|(touched, triangle)| {
-            let touches = |place| Face::new(triangle, Some(place)).touches_any(&scene);
+            let touches = |place: &&Place| Face::new(triangle, Some(*place)).touches_any(&scene);
             *touched = all || places.iter().any(touches);
         });
     }

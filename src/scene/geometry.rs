@@ -19,6 +19,7 @@ use super::graph::{PlacedNode, node_label};
 use super::instance::Instance;
 use super::morph;
 use super::primitive::{Primitive, primitive_label};
+use super::sharing;
 use super::skin::Skins;
 
 /// The most triangles that a scene may have. A few hundred bytes of instances of instances could ask for any number.
@@ -117,7 +118,7 @@ pub(super) fn instances<'a>(
 /// Builds the triangles of all instances in render space, without those that have no area.
 pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut Warnings) -> Check<Geometry> {
     let normalisation = normalise(root, instances)?;
-    let mut builder = Builder::new(normalisation);
+    let mut builder = Builder::new(normalisation, sharing::is_worth_it(root, instances));
     let mut dropped = Vec::new();
     for instance in instances {
         let count = builder

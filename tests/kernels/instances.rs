@@ -1,6 +1,6 @@
 //! Instances that share triangles, against the same scene where every node has a mesh of its own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 use ppm_vk::backend::Backend;
@@ -18,11 +18,18 @@ use super::agreement::Agreement;
 use super::bench::{packed, random_numbers, scene, small, xyz};
 use super::rays::{Probe, Ray, ray};
 
-/// The scene `instances` with a mesh for each node: nothing is shared.
-fn apart() -> Scene {
-    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    let text = std::fs::read_to_string(scenes.join("instances.gltf")).expect("a scene");
-    let mut document: Value = serde_json::from_str(&text).expect("JSON");
+fn scenes() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")
+}
+
+/// The scene `instances`.
+fn document() -> Value {
+    let text = std::fs::read_to_string(scenes().join("instances.gltf")).expect("a scene");
+    serde_json::from_str(&text).expect("JSON")
+}
+
+/// Gives each node a mesh of its own: nothing is shared.
+fn take_apart(document: &mut Value) {
     for node in 0..document["nodes"].as_array().expect("nodes").len() {
         let Some(mesh) = document["nodes"][node]["mesh"].as_u64() else {
             continue;
@@ -33,11 +40,21 @@ fn apart() -> Scene {
         let last = meshes.len() - 1;
         document["nodes"][node]["mesh"] = json!(last);
     }
+}
+
+fn load(document: &Value) -> Scene {
     let folder = tempfile::TempDir::new().expect("a folder");
-    std::fs::copy(scenes.join("instances.bin"), folder.path().join("instances.bin")).expect("a buffer");
-    let path = folder.path().join("apart.gltf");
+    std::fs::copy(scenes().join("instances.bin"), folder.path().join("instances.bin")).expect("a buffer");
+    let path = folder.path().join("changed.gltf");
     std::fs::write(&path, document.to_string()).expect("a file");
     Scene::load(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The scene with a mesh for each node.
+fn apart() -> Scene {
+    let mut document = document();
+    take_apart(&mut document);
+    load(&document)
 }
 
 /// Rays between places in the room.
@@ -179,14 +196,43 @@ fn picture(scene: &Scene, packed: &PackedScene) -> Image {
     renderer.resolve().expect("a picture")
 }
 
+/// The same paths: what differs is the few of them that rounding sends another way.
+fn assert_same_picture(shared: &Scene, apart: &Scene) {
+    let (packed_shared, mut packed_apart) = (packed(shared), packed(apart));
+    assert!(packed_shared.features.instanced && !packed_apart.features.instanced);
+    order_lamp(&mut packed_apart, &packed_shared);
+    let found = picture(shared, &packed_shared);
+    let comparison = compare(&found, &picture(apart, &packed_apart)).expect("pictures of one size");
+    println!("{comparison:?}");
+    assert!(comparison.rel_mse < 1e-4, "{comparison:?}");
+}
+
 #[test]
 fn the_picture_of_instances_is_that_of_meshes_of_their_own() {
-    let (shared, apart) = (scene("instances"), apart());
-    let (packed_shared, mut packed_apart) = (packed(&shared), packed(&apart));
-    order_lamp(&mut packed_apart, &packed_shared);
-    let found = picture(&shared, &packed_shared);
-    let comparison = compare(&found, &picture(&apart, &packed_apart)).expect("pictures of one size");
-    println!("{comparison:?}");
-    // The same paths: what differs is the few of them that rounding sends another way.
-    assert!(comparison.rel_mse < 1e-4, "{comparison:?}");
+    assert_same_picture(&scene("instances"), &apart());
+}
+
+/// Floats are fine where the floor is: nothing in its own coordinates tells how far the rounding of an instance may put its
+/// bottom from it.
+#[test]
+fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
+    let mut document = document();
+    let nodes = document["nodes"].as_array_mut().expect("nodes");
+    let floor = nodes.iter().find(|node| node["name"] == "floor").expect("a floor");
+    let below = json!({"name": "below", "mesh": floor["mesh"], "translation": [0, -2, 0]});
+    nodes.push(below);
+    let last = nodes.len() - 1;
+    let roots = document["scenes"][0]["nodes"].as_array_mut().expect("roots");
+    roots.push(json!(last));
+    let shared = load(&document);
+    take_apart(&mut document);
+    let apart = load(&document);
+    let floor = apart
+        .objects
+        .iter()
+        .find(|object| object.name == "floor")
+        .expect("a floor");
+    let corner = apart.triangles[floor.triangles.start as usize].vertices[0] as usize;
+    assert_eq!(apart.positions[corner].y, 0.0);
+    assert_same_picture(&shared, &apart);
 }

@@ -101,7 +101,11 @@ fn what_nodes_show_differently_is_not_shared() {
     morphed.set("/meshes/2/primitives/0/targets", json!([{"POSITION": target}]));
     assert_eq!(placed(&morphed.scene()), 2, "a target without weight moves nothing");
     morphed.set("/nodes/4/weights", json!([0.5]));
-    assert_eq!(placed(&morphed.scene()), 1, "a morphed one");
+    assert_eq!(
+        placed(&morphed.scene()),
+        0,
+        "a morphed one, and the only one that is left"
+    );
 
     let mut skinned = two();
     let joints = skinned.add_accessor(&[0; 4 * 42], 42, 5121, "VEC4");
@@ -111,6 +115,16 @@ fn what_nodes_show_differently_is_not_shared() {
     skinned.set("/skins", json!([{"joints": [0]}]));
     skinned.set("/nodes/3/skin", json!(0)).set("/nodes/4/skin", json!(0));
     assert_eq!(placed(&skinned.scene()), 0, "skinned ones");
+}
+
+#[test]
+fn what_saves_little_is_not_shared() {
+    let mut room = with_two(json!({}), json!({"translation": [0.5, 0, 0]}));
+    add_fan(&mut room, 190, 0);
+    room.add_root(json!({"mesh": 3}));
+    assert_eq!(placed(&room.scene()), 0, "40 triangles of 273");
+    room.add_root(json!({"mesh": 2, "translation": [0, 0.5, 0]}));
+    assert_eq!(placed(&room.scene()), 3, "80 of 313: a third node makes it worth while");
 }
 
 #[test]
