@@ -117,22 +117,43 @@ struct Boundary {
     vec3 refracted_weight;
 };
 
+// Weighs what a boundary reflects and refracts with what extensions make of it. ior: index inside over that outside.
+void weigh(inout Boundary boundary, Facing facing, vec3 incoming, Material material, float ior) {
+    bool specular = SPECULAR_GLASS && boundary.reflectance < 1.0;
+    if (specular) {
+        // KHR_materials_specular changes the ends of Fresnel's curve, total reflection apart.
+        float f0 = normal_reflectance(ior);
+        vec3 changed = mix(material.specular_f0 * (f0 / max(normal_reflectance(material.ior), 1e-10)),
+                           vec3(material.specular_f90), (boundary.reflectance - f0) / (1.0 - f0));
+        boundary.reflected_weight *= changed / max(boundary.reflectance, 1e-10);
+        boundary.refracted_weight *= (1.0 - changed) / (1.0 - boundary.reflectance);
+    }
+    if (is_coated(material)) {
+        // It lies outside.
+        bool front = facing.front || is_thin(material);
+        float passes = coat_passes(material.coat, -dot(front ? incoming : boundary.refracted, facing.shading_normal));
+        boundary.reflected_weight *= front ? passes : 1.0;
+        boundary.refracted_weight *= passes;
+    }
+}
+
 // outside: index of refraction. u chooses the microfacet of a rough boundary. A thin wall is crossed without bending.
 Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float outside, vec2 u) {
     vec3 n = facing.shading_normal;
     float alpha = material.roughness * material.roughness;
     bool rough = ROUGH_GLASS && alpha >= SMOOTH_ALPHA;
+    Facing micro = facing;
     if (rough) {
-        facing.shading_normal = visible_normal(alpha, n, -incoming, u);
+        micro.shading_normal = visible_normal(alpha, n, -incoming, u);
     }
-    vec3 m = facing.shading_normal;
+    vec3 m = micro.shading_normal;
     float ior = material.ior / outside;
     Boundary boundary;
     boundary.eta = facing.front || is_thin(material) ? 1.0 / ior : ior;
     float cos_i = -dot(incoming, m);
     float cos_t;
     boundary.reflectance = fresnel_dielectric(cos_i, boundary.eta, cos_t);
-    boundary.reflected = mirror_direction(facing, incoming);
+    boundary.reflected = mirror_direction(micro, incoming);
     boundary.refracted = normalize(boundary.eta * incoming + (boundary.eta * cos_i - cos_t) * m);
     boundary.reflected_weight = vec3(1.0);
     boundary.refracted_weight = vec3(1.0);
@@ -149,21 +170,6 @@ Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float ou
         boundary.reflected_weight = vec3(up > 0.0 ? joint_masking(alpha, nv, up) : 0.0);
         boundary.refracted_weight = vec3(down > 0.0 ? 2.0 * down / (down + masking_root(alpha, down)) : 0.0);
     }
-    bool specular = SPECULAR_GLASS && boundary.reflectance < 1.0;
-    if (specular) {
-        // KHR_materials_specular changes the ends of Fresnel's curve, total reflection apart.
-        float f0 = normal_reflectance(ior);
-        vec3 changed = mix(material.specular_f0 * (f0 / max(normal_reflectance(material.ior), 1e-10)),
-                           vec3(material.specular_f90), (boundary.reflectance - f0) / (1.0 - f0));
-        boundary.reflected_weight *= changed / max(boundary.reflectance, 1e-10);
-        boundary.refracted_weight *= (1.0 - changed) / (1.0 - boundary.reflectance);
-    }
-    if (is_coated(material)) {
-        // It lies outside.
-        bool front = facing.front || is_thin(material);
-        float passes = coat_passes(material.coat, -dot(front ? incoming : boundary.refracted, n));
-        boundary.reflected_weight *= front ? passes : 1.0;
-        boundary.refracted_weight *= passes;
-    }
+    weigh(boundary, facing, incoming, material, ior);
     return boundary;
 }

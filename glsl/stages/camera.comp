@@ -19,6 +19,7 @@ layout(local_size_x = 64) in;
 #include "contact.glsl"
 #include "environment.glsl"
 #include "light.glsl"
+#include "glint.glsl"
 #include "visible_point.glsl"
 #include "status.glsl"
 
@@ -80,35 +81,6 @@ Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, uint medium
         emission *= transmittance(met.through, hit.t);
     }
     return Glimpse(emission, dark);
-}
-
-// What a narrow reflection shows of the lights without extent, which no direction of it meets: by a ray to one of them or, where
-// visible points are found once, to each.
-vec3 glint(Surface surface, Facing facing, Reflector reflector, vec3 viewer, inout Random random) {
-    vec4 u = next4(random);
-    uint chosen = choose_light(u.x, u.yz).light;
-    bool of_one = settings.slots_per_pixel == 1u;
-    uint begin = of_one ? chosen : 0u;
-    uint end = of_one ? chosen + 1u : settings.light_count;
-    vec3 origin = offset_origin(surface.position, facing.geometric_normal, surface.reach);
-    reflector.diffuse = vec3(0.0);
-    vec3 sum = vec3(0.0);
-    for (uint i = begin; i < end && !loops_cut; i++) {
-        Light light = light_at(i);
-        if (!is_punctual(light.kind)) {
-            continue;
-        }
-        Arriving arriving = arriving_from(punctual_light_at(i), light.kind, origin);
-        vec3 direction = normalize(arriving.ray);
-        float cosine = dot(direction, facing.shading_normal);
-        bool faces = cosine > 0.0 && dot(direction, facing.geometric_normal) > 0.0 && largest(arriving.irradiance) > 0.0;
-        if (faces && trace_visible(origin, arriving.ray, arriving.end, NO_TRIANGLE, true, random).triangle == MISS) {
-            float probability = of_one ? light.probability : 1.0;
-            sum += brdf(reflector, facing.shading_normal, viewer, direction) * arriving.irradiance *
-                   (cosine / probability);
-        }
-    }
-    return sum;
 }
 
 // Follows what a boundary of microfacets reflects, or none of it where that would fly into the surface.
@@ -223,7 +195,7 @@ void main() {
                     branch.direction = mirror_direction(facing, branch.direction);
                 } else if (is_glossy(material)) {
                     if (PUNCTUAL_LIGHTS && reflector.alpha >= SMOOTH_ALPHA) {
-                        branch.emitted += branch.throughput * glint(surface, facing, reflector, viewer, random);
+                        branch.emitted += branch.throughput * glint(met, material, facing, reflector, viewer, random);
                     }
                     Branch reflected = branch;
                     float p = reflection_probability(reflector, dot(viewer, facing.shading_normal));
@@ -246,6 +218,11 @@ void main() {
                 } else if (DIELECTRICS) {
                     if (DISPERSION) {
                         branch.throughput *= disperse(material, branch.wavelength, random);
+                    }
+                    bool rough = ROUGH_GLASS && material.roughness * material.roughness >= SMOOTH_ALPHA;
+                    if (PUNCTUAL_LIGHTS && rough) {
+                        branch.emitted +=
+                            branch.throughput * glint(met, material, facing, reflector, viewer, random);
                     }
                     Boundary boundary = meet_boundary(facing, branch.direction, material, met.outside, u.yz);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.

@@ -6,21 +6,23 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::boundary::Boundary;
 use super::contact::{Encounter, choose_part, is_mixed, transmittance};
 use super::dispersion::disperse;
 use super::environment::Environment;
+use super::glint::glint;
 use super::gloss::{FOLLOWED_ALPHA, Reflector};
 use super::intersect::{PlacedTriangle, Ray};
-use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
+use super::light::{emits, emitted_radiance};
 use super::random::{PathKind, Random};
 use super::sampling::{disc_point, encode_direction};
-use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface};
+use super::surface::{Facing, GLOSSY, MATTE, MIRROR, Surface};
 use super::texture::nearest_visible;
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{BACK_HIDDEN, Gloss, Light, NO_OBJECT, VisiblePoint};
+use crate::layout::{BACK_HIDDEN, Gloss, NO_OBJECT, VisiblePoint};
 
 /// What is left of a path that splits.
 #[derive(Clone, Copy)]
@@ -63,40 +65,6 @@ fn glimpse(
     } else {
         (DVec3::ZERO, dark)
     }
-}
-
-/// What a narrow reflection shows of the lights without extent, which no direction of it meets.
-fn glint(
-    inputs: &Inputs<'_>,
-    surface: &Surface,
-    facing: &Facing,
-    reflector: &Reflector,
-    viewer: DVec3,
-    random: &mut Random,
-) -> DVec3 {
-    let [u, first_digits, second_digits, _] = random.next4();
-    let lights = &inputs.scene.lights;
-    let chosen = choose_light(lights, u, [first_digits, second_digits]).light;
-    let of_one = inputs.settings.slots_per_pixel == 1;
-    let asked = if of_one { std::slice::from_ref(chosen) } else { lights };
-    let origin = surface.origin_towards(facing.geometric_normal);
-    let boundary = Reflector {
-        diffuse: DVec3::ZERO,
-        ..*reflector
-    };
-    let from = |light: &Light| {
-        let Arriving { ray, end, irradiance } = arriving_from(light, origin);
-        let direction = ray.normalize();
-        let cosine = direction.dot(facing.shading_normal);
-        let faces = cosine > 0.0 && direction.dot(facing.geometric_normal) > 0.0 && irradiance.max_element() > 0.0;
-        let ray = Ray { origin, direction: ray };
-        if !faces || nearest_visible(inputs, ray, end, None, random).is_some() {
-            return DVec3::ZERO;
-        }
-        let probability = if of_one { f64::from(light.probability) } else { 1.0 };
-        boundary.brdf(facing.shading_normal, viewer, direction) * irradiance * (cosine / probability)
-    };
-    asked.iter().filter(|light| is_punctual(light)).map(from).sum()
 }
 
 /// Visible points, in slot order: as many for each pixel slot as
@@ -289,7 +257,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let [choice, second, third, _] = random.next4();
             if is_glossy {
                 if inputs.scene.features.punctual && !reflector.is_smooth() {
-                    let seen = glint(inputs, &surface, &facing, &reflector, -incoming, &mut random);
+                    let seen = glint(inputs, &met, &material, &facing, &reflector, incoming, &mut random);
                     branch.emitted += branch.throughput * seen;
                 }
                 let p = reflector.reflection_probability(-incoming.dot(facing.shading_normal));
@@ -328,6 +296,11 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 facing.reflect(incoming)
             } else {
                 branch.throughput *= disperse(&mut material, &mut branch.wavelength, &mut random);
+                let microfacets = reflector.with_alpha(f64::from(material.roughness).powi(2));
+                if inputs.scene.features.punctual && !microfacets.is_smooth() {
+                    let seen = glint(inputs, &met, &material, &facing, &microfacets, incoming, &mut random);
+                    branch.emitted += branch.throughput * seen;
+                }
                 let boundary = Boundary::new(&facing, incoming, &material, met.outside, [second, third]);
                 // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
                 let transmission = met.tint * boundary.eta.powi(2) * boundary.refracted_weight;

@@ -125,7 +125,7 @@ impl Reflector {
         self.alpha < SMOOTH_ALPHA
     }
 
-    fn ggx(&self, n: DVec3, h: DVec3) -> f64 {
+    pub(super) fn ggx(&self, n: DVec3, h: DVec3) -> f64 {
         let a2 = self.alpha * self.alpha;
         a2 / (PI * (n.cross(h).length_squared() + a2 * n.dot(h).powi(2)).powi(2))
     }

@@ -9,6 +9,7 @@
 //! Every function gives the same bits whatever the number of threads: paths are dealt to lanes, not to threads, and no
 //! sum depends on an order.
 
+mod boundary;
 mod camera;
 mod contact;
 mod coverage;
@@ -17,6 +18,7 @@ mod dispersion;
 mod emission;
 mod environment;
 mod gather;
+mod glint;
 mod gloss;
 mod intersect;
 mod light;

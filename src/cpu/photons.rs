@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::boundary::Boundary;
 use super::contact::{Encounter, choose_part, transmittance};
 use super::dispersion::disperse;
 use super::emission::emit;
@@ -11,7 +12,7 @@ use super::intersect::{PlacedTriangle, Ray};
 use super::light::range_window;
 use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction};
-use super::surface::{Boundary, GLOSSY, MATTE, MIRROR};
+use super::surface::{GLOSSY, MATTE, MIRROR};
 use super::texture::{nearest_visible, share_there};
 use super::vector::{rgb, with_word};
 use super::{Counts, FAR, Inputs};
