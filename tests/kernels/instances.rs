@@ -8,10 +8,10 @@ use ppm_vk::config::{Accel, RenderConfig, TriangleTest};
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
-use ppm_vk::layout::{Settings, TOUCHED};
+use ppm_vk::layout::{Settings, ShadingTriangle, TOUCHED};
 use ppm_vk::metrics::compare;
 use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::scene::{PackedScene, Placement, Scene};
 use serde_json::{Value, json};
 
 use super::agreement::Agreement;
@@ -181,7 +181,7 @@ fn order_lamp(scene: &mut PackedScene, wanted: &PackedScene) {
     }
 }
 
-fn picture(scene: &Scene, packed: &PackedScene) -> Image {
+fn picture(scene: &Scene, packed: &PackedScene, iterations: u32) -> Image {
     let config = RenderConfig {
         resolution: [64, 63],
         photons: 20_000,
@@ -190,26 +190,26 @@ fn picture(scene: &Scene, packed: &PackedScene) -> Image {
     };
     let device = Device::open(None).expect("a Vulkan device");
     let mut renderer = Renderer::new(device, packed, &scene.cameras[0], config).expect("a renderer");
-    for _ in 0..8 {
+    for _ in 0..iterations {
         renderer.iterate().expect("an iteration");
     }
     renderer.resolve().expect("a picture")
 }
 
 /// The same paths: what differs is the few of them that rounding sends another way.
-fn assert_same_picture(shared: &Scene, apart: &Scene) {
+fn assert_same_picture(shared: &Scene, apart: &Scene, iterations: u32, most: f64) {
     let (packed_shared, mut packed_apart) = (packed(shared), packed(apart));
     assert!(packed_shared.features.instanced && !packed_apart.features.instanced);
     order_lamp(&mut packed_apart, &packed_shared);
-    let found = picture(shared, &packed_shared);
-    let comparison = compare(&found, &picture(apart, &packed_apart)).expect("pictures of one size");
+    let found = picture(shared, &packed_shared, iterations);
+    let comparison = compare(&found, &picture(apart, &packed_apart, iterations)).expect("pictures of one size");
     println!("{comparison:?}");
-    assert!(comparison.rel_mse < 1e-4, "{comparison:?}");
+    assert!(comparison.rel_mse < most, "{comparison:?}");
 }
 
 #[test]
 fn the_picture_of_instances_is_that_of_meshes_of_their_own() {
-    assert_same_picture(&scene("instances"), &apart());
+    assert_same_picture(&scene("instances"), &apart(), 8, 1e-4);
 }
 
 /// Floats are fine where the floor is: nothing in its own coordinates tells how far the rounding of an instance may put its
@@ -220,10 +220,22 @@ fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
     let nodes = document["nodes"].as_array_mut().expect("nodes");
     let floor = nodes.iter().find(|node| node["name"] == "floor").expect("a floor");
     let below = json!({"name": "below", "mesh": floor["mesh"], "translation": [0, -2, 0]});
+    let glass = nodes.iter().find(|node| node["name"] == "glass").expect("glass")["mesh"].clone();
     nodes.push(below);
-    let last = nodes.len() - 1;
+    let first = nodes.len();
+    for i in 0..10 {
+        let (turn, height) = (0.3 * f64::from(i), 0.3 + 0.13 * f64::from(i));
+        nodes.push(json!({
+            "mesh": glass, "translation": [0.33 * f64::from(i % 5) - 0.7, 0, 0.72 + 0.3 * f64::from(i / 5)],
+            "rotation": [0, turn.sin(), 0, turn.cos()], "scale": [0.6, height, 0.5]
+        }));
+    }
+    // Products of two scales aren't numbers of 24 bits.
+    let all = nodes.len();
+    let glasses: Vec<usize> = (first..all).collect();
+    nodes.push(json!({"children": glasses, "scale": [0.9, 1.1, 0.95]}));
     let roots = document["scenes"][0]["nodes"].as_array_mut().expect("roots");
-    roots.push(json!(last));
+    roots.extend([json!(first - 1), json!(all)]);
     let shared = load(&document);
     take_apart(&mut document);
     let apart = load(&document);
@@ -234,5 +246,19 @@ fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
         .expect("a floor");
     let corner = apart.triangles[floor.triangles.start as usize].vertices[0] as usize;
     assert_eq!(apart.positions[corner].y, 0.0);
-    assert_same_picture(&shared, &apart);
+    // Some bottoms lie above it now by a rounding of their height.
+    let scene = packed(&shared);
+    let bottoms = scene.instances.iter().filter_map(|instance| {
+        let triangles =
+            &scene.shading_triangles[instance.first_triangle as usize..][..instance.triangle_count as usize];
+        let placement = Placement { rows: instance.rows };
+        let height = |t: &ShadingTriangle| placement.point(xyz(t.p0).as_vec3()).y;
+        let is_glass = scene.materials[triangles[0].material as usize].surface == 2;
+        is_glass.then(|| triangles.iter().map(height).fold(f32::INFINITY, f32::min))
+    });
+    let bottoms: Vec<f32> = bottoms.collect();
+    println!("{bottoms:?}");
+    assert!(bottoms.iter().any(|&y| y > 0.0 && y < 1e-8));
+    // Light takes many ways through so much glass. Without the reach of instances relMSE is 0.005.
+    assert_same_picture(&shared, &apart, 48, 2e-3);
 }
