@@ -268,8 +268,23 @@ def punctual(light, position, scale):
 def surroundings(environment):
     if isinstance(environment, tuple):
         return {"type": "constant", "radiance": {"type": "rgb", "value": list(environment)}}
-    # Upper edge +Y, centre +Z, -X to the right of it: as ppm-vk has it.
-    return {"type": "envmap", "filename": str(environment)}
+    # Upper edge +Y, centre +Z, -X to the right of it: as ppm-vk has it. But Mitsuba's uppermost and lowest rows lie at the
+    # poles, and not half a row away: of finer rows that is little.
+    picture = mi.Bitmap(str(environment)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
+    pixels = np.array(picture)
+    for axis, mode in ((0, "edge"), (1, "wrap")):
+        pixels = finer(pixels, axis, mode, max(1, 2048 // pixels.shape[axis]))
+    return {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(pixels, dtype=np.float32))}
+
+
+def finer(pixels, axis, mode, times):
+    """So many times as many pixels along an axis, interpolated between their centres."""
+    count = pixels.shape[axis]
+    padded = np.pad(pixels, [(1, 1) if along == axis else (0, 0) for along in range(3)], mode=mode)
+    at = (np.arange(count * times) + 0.5) / times + 0.5
+    low = np.floor(at).astype(int)
+    part = (at - low).reshape([-1 if along == axis else 1 for along in range(3)])
+    return (1 - part) * padded.take(low, axis) + part * padded.take(low + 1, axis)
 
 
 def bounding_sphere(points):
