@@ -12,12 +12,14 @@ vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outs
     bool passes = dot(l, facing.geometric_normal) < 0.0;
     bool bends = passes && !thin;
     vec3 h = bends ? eta * v + l : v + (passes ? l - 2.0 * dot(l, n) * n : l);
-    h = normalize(dot(h, n) < 0.0 ? -h : h);
+    float length2 = dot(h, h);
+    h *= (dot(h, n) < 0.0 ? -1.0 : 1.0) * inversesqrt(max(length2, 1e-12));
     float nv = dot(n, v);
     float nl = dot(n, l);
     float vh = dot(v, h);
     float lh = dot(l, h);
-    if (nv <= 0.0 || vh <= 0.0 || (nl < 0.0) != passes || (bends && lh >= 0.0)) {
+    // Straight through without bending, any microfacet will do: that is no lobe.
+    if (nv <= 0.0 || vh <= 0.0 || (nl < 0.0) != passes || (bends && lh >= 0.0) || length2 < 1e-12) {
         return vec3(0.0);
     }
     float cos_t;

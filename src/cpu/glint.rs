@@ -84,9 +84,11 @@ fn glass_response(
         (true, true) => v + l - 2.0 * l.dot(n) * n,
         (true, false) => eta * v + l,
     };
-    let h = (if h.dot(n) < 0.0 { -h } else { h }).normalize();
+    let length2 = h.length_squared();
+    let h = (if h.dot(n) < 0.0 { -h } else { h }) / length2.max(1e-12).sqrt();
     let (nv, nl, vh, lh) = (n.dot(v), n.dot(l), v.dot(h), l.dot(h));
-    if nv <= 0.0 || vh <= 0.0 || (nl < 0.0) != passes || (bends && lh >= 0.0) {
+    // Straight through without bending, any microfacet will do: that is no lobe.
+    if nv <= 0.0 || vh <= 0.0 || (nl < 0.0) != passes || (bends && lh >= 0.0) || length2 < 1e-12 {
         return DVec3::ZERO;
     }
     let fresnel = fresnel_dielectric(vh, eta);
