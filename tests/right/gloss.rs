@@ -6,7 +6,7 @@ use glam::{DVec3, dvec3};
 use ppm_vk::config::{Direct, RenderConfig};
 use ppm_vk::cpu::{PathKind, Random, Reflector};
 
-use crate::document::{Document, light, metallic_roughness};
+use crate::document::{Document, light, matte, metallic_roughness};
 use crate::measure::{Measured, Region, measure};
 use crate::mesh::Mesh;
 use crate::picture::small;
@@ -289,5 +289,46 @@ fn a_coated_white_base_gains_no_more_than_the_model_does() {
             mean < 1.06 && mean > 0.9,
             "α {alpha}: {mean} of diffuse light is reflected"
         );
+    }
+}
+
+/// At the ends of the roughnesses that are mirrors, that paths follow, and that visible points have, the picture goes on as it
+/// was: a plate in a black room with one shining wall.
+#[test]
+fn roughness_passes_over_from_mirrors_to_wide_lobes_without_a_step() {
+    const SIDE: usize = 32;
+    // α is 1e-3 and 0.1 in the middle of the second and the third.
+    for (one, other) in [(0.0, 0.01), (0.0312, 0.0320), (0.3160, 0.3164)] {
+        for metallic in [0.0, 1.0] {
+            let regions = [([12, 16], 5), ([16, 16], 12)];
+            let regions = regions.map(|(centre, side)| Region::around(centre, side));
+            let [one_mean, other_mean] = [one, other].map(|roughness| {
+                let mut scene = Document::new("plate");
+                let plate = scene.material(metallic_roughness("plate", [0.9; 3], metallic, roughness));
+                let wall = scene.material(light("wall", [1.0; 3]));
+                let black = scene.material(matte("black", [0.0; 3]));
+                scene.object("plate", &Mesh::facing_up(0.9, 0.0), plate);
+                let room = Mesh::cuboid(dvec3(-1.0, -0.1, -1.0), dvec3(1.0, 1.4, 1.0)).flipped();
+                scene.object("room", &room, black);
+                // The middle of the picture mirrors its edge.
+                let corners = [[-0.95, 0.85], [0.0, 0.85], [0.0, 1.35], [-0.95, 1.35]];
+                let corners = corners.map(|[x, y]| dvec3(x, y, -0.95));
+                scene.object("wall", &Mesh::quad(corners), wall);
+                scene.camera([0.8, 0.85], [0.0, 0.0], 20.0);
+                let config = RenderConfig {
+                    radius: Some(0.1),
+                    ..small(SIDE as u32, 1000)
+                };
+                measure(&subject(scene), config, 64, |image| {
+                    regions.iter().map(|region| region.of(image, 0)).collect()
+                })
+            });
+            for (region, (one_mean, other_mean)) in one_mean.iter().zip(&other_mean).enumerate() {
+                let what = format!("metallic {metallic}, roughness {other} less {one}, region {region}");
+                // How much a lobe widens over the interval.
+                let slack = 3e-3;
+                other_mean.minus(one_mean).assert_between(-slack, slack, &what);
+            }
+        }
     }
 }
