@@ -37,10 +37,12 @@ pub const TEXTURED: u32 = 4;
 /// Bit of [`ShadingTriangle::flags`]: parts of it may not be there, see [`Material::alpha_mode`].
 pub const SEE_THROUGH: u32 = 8;
 
-/// [`Material::sides`]: the back emits as the front does.
+/// [`Material::flags`]: the back emits as the front does.
 pub const BACK_EMITS: u32 = 1;
-/// [`Material::sides`]: no camera sees the back.
+/// [`Material::flags`]: no camera sees the back.
 pub const BACK_HIDDEN: u32 = 2;
+/// [`Material::flags`]: a dielectric that reflects another part of the light than its index says.
+pub const SPECULAR_CHANGED: u32 = 4;
 
 /// Texture of a material that has none there.
 pub const NO_TEXTURE: u32 = u32::MAX;
@@ -248,8 +250,8 @@ device_structs! {
         pub emission: [f32; 3],
         /// Index of refraction inside.
         pub ior: f32,
-        /// [`BACK_EMITS`], [`BACK_HIDDEN`].
-        pub sides: u32,
+        /// [`BACK_EMITS`], [`BACK_HIDDEN`], [`SPECULAR_CHANGED`].
+        pub flags: u32,
         /// How far the surface is a metal.
         pub metallic: f32,
         /// Of a glossy surface; its square is GGX's α.

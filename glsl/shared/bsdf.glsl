@@ -1,4 +1,4 @@
-// Smooth boundaries. Directions: `incoming` flies towards the surface; cosines are positive.
+// Boundaries. Directions: `incoming` flies towards the surface; cosines are positive.
 
 // Unpolarised Fresnel reflectance of a dielectric; eta: index of the incident side over that of the other side.
 float fresnel_dielectric(float cos_i, float eta, out float cos_t) {
@@ -82,7 +82,7 @@ vec3 scatter(Reflector reflector, Facing facing, vec3 v, vec4 u, inout vec3 outg
 }
 
 // What a ray meets of a coated surface is by chance the coat, which then is the material, or what lies below it. Returns the
-// factor of what the path carries; u is a uniform number. The inside of glass has no coat.
+// factor of what the path carries; u is a uniform number. Of what is all clear, the inside has no coat.
 float choose_layer(inout Material material, inout Facing facing, Surface surface, vec3 incoming, float u) {
     bool coated = is_coated(material) && (facing.front || !is_dielectric(material) || is_thin(material));
     if (!coated) {
@@ -90,8 +90,8 @@ float choose_layer(inout Material material, inout Facing facing, Surface surface
     }
     vec3 n = facing.front ? surface.coat_normal : -surface.coat_normal;
     n = dot(incoming, n) < 0.0 ? n : facing.geometric_normal;
-    // At least a quarter, as of any reflection; at most most, for what a smooth coat doesn't reflect at a grazing angle, a
-    // rough one passes.
+    // At least a quarter, as of any reflection; and 0.9 at the most, so that what a rough coat passes at grazing angles isn't
+    // found by a rare choice.
     float p = clamp(1.0 - coat_passes(material.coat, -dot(incoming, n)), 0.25 * material.coat, 0.9);
     if (u >= p) {
         return 1.0 / (1.0 - p);
@@ -117,23 +117,26 @@ struct Boundary {
     vec3 refracted_weight;
 };
 
-// Weighs what a boundary reflects and refracts with what extensions make of it. ior: index inside over that outside.
-void weigh(inout Boundary boundary, Facing facing, vec3 incoming, Material material, float ior) {
-    bool specular = SPECULAR_GLASS && boundary.reflectance < 1.0;
+// Weighs what a boundary reflects and refracts with what extensions make of it. ior: index inside over that outside; cosine: to
+// the microfacet's normal.
+void weigh(inout Boundary boundary, Facing facing, vec3 incoming, Material material, float ior, float cosine) {
+    bool specular = SPECULAR_GLASS && (material.flags & SPECULAR_CHANGED) != 0u && boundary.reflectance < 1.0;
     if (specular) {
         // KHR_materials_specular changes the ends of Fresnel's curve, total reflection apart.
         float f0 = normal_reflectance(ior);
         vec3 changed = mix(material.specular_f0 * (f0 / max(normal_reflectance(material.ior), 1e-10)),
                            vec3(material.specular_f90), (boundary.reflectance - f0) / (1.0 - f0));
+        changed = min(changed, 1.0);
         boundary.reflected_weight *= changed / max(boundary.reflectance, 1e-10);
         boundary.refracted_weight *= (1.0 - changed) / (1.0 - boundary.reflectance);
     }
     if (is_coated(material)) {
-        // It lies outside.
-        bool front = facing.front || is_thin(material);
-        float passes = coat_passes(material.coat, -dot(front ? incoming : boundary.refracted, facing.shading_normal));
-        boundary.reflected_weight *= front ? passes : 1.0;
-        boundary.refracted_weight *= passes;
+        // It lies outside, and its angle is the same whichever way the light goes.
+        vec3 outside = facing.front ? incoming : boundary.refracted;
+        float of_refracted = is_thin(material) ? cosine : -dot(outside, facing.shading_normal);
+        boundary.reflected_weight *=
+            facing.front || is_thin(material) ? coat_passes(material.coat, cosine) : 1.0;
+        boundary.refracted_weight *= coat_passes(material.coat, of_refracted);
     }
 }
 
@@ -170,6 +173,6 @@ Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float ou
         boundary.reflected_weight = vec3(up > 0.0 ? joint_masking(alpha, nv, up) : 0.0);
         boundary.refracted_weight = vec3(down > 0.0 ? 2.0 * down / (down + masking_root(alpha, down)) : 0.0);
     }
-    weigh(boundary, facing, incoming, material, ior);
+    weigh(boundary, facing, incoming, material, ior, cos_i);
     return boundary;
 }

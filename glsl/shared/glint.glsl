@@ -28,7 +28,7 @@ vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outs
     boundary.refracted = l;
     boundary.reflected_weight = vec3(1.0);
     boundary.refracted_weight = vec3(1.0);
-    weigh(boundary, facing, -v, material, ior);
+    weigh(boundary, facing, -v, material, ior, vh);
     float visible = 2.0 * ggx(alpha, n, h) / (nv + masking_root(alpha, nv)); // D · G1(v) / nv
     if (!passes) {
         return boundary.reflectance * boundary.reflected_weight * (0.25 * visible * joint_masking(alpha, nv, nl));

@@ -73,7 +73,7 @@ Choice choose_light(float u, vec2 digits) {
 
 // Whether light leaves on the triangle's front, or on its back.
 bool emits(Material material, bool front) {
-    return front || (material.sides & BACK_EMITS) != 0u;
+    return front || (material.flags & BACK_EMITS) != 0u;
 }
 
 // Radiance at this cosine to the normal: a coat lies on lamps too.

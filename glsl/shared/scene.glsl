@@ -30,6 +30,7 @@ const uint TOUCHED = 2u;       // a dielectric's, and it may lie on a face of an
 
 const uint BACK_EMITS = 1u;
 const uint BACK_HIDDEN = 2u;
+const uint SPECULAR_CHANGED = 4u;
 
 const uint MIRROR = 1u;
 const uint DIELECTRIC = 2u;
@@ -75,11 +76,11 @@ struct Material {
     uint surface;      // MIRROR, DIELECTRIC, GLOSSY_SURFACE or 0 for matte
     vec3 emission;     // radiance
     float ior;
-    uint sides;        // BACK_EMITS, BACK_HIDDEN
+    uint flags;        // BACK_EMITS, BACK_HIDDEN, SPECULAR_CHANGED
     float metallic;
     float roughness;
     float transmission; // share of a dielectric's part that is no metal that passes light; the rest is glossy
-    vec3 specular_f0;   // of a glossy surface's dielectric part
+    vec3 specular_f0;   // of a glossy surface's dielectric part, or of glass
     float specular_f90;
     vec3 absorption;    // inside of a dielectric, 1/length
     uint thin;          // a dielectric without an inside

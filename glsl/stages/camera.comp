@@ -149,8 +149,10 @@ void main() {
             Surface surface = met.surface;
             Material material = met.material;
             Facing facing = met.facing;
-            bool culled = CULLING && branch.depth == 0u && !facing.front && (material.sides & BACK_HIDDEN) != 0u;
+            bool culled = CULLING && branch.depth == 0u && !facing.front && (material.flags & BACK_HIDDEN) != 0u;
             if (culled) {
+                // What lies behind isn't there by the same chance again.
+                next4(random);
                 branch.origin = origin_towards(surface, branch.direction);
                 branch.ignored = surface.triangle;
                 continue;

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::gloss::{Reflector, coat_passes};
 use super::surface::Facing;
 use super::vector::rgb;
-use crate::layout::Material;
+use crate::layout::{Material, SPECULAR_CHANGED};
 
 /// What can happen at a dielectric boundary.
 pub(super) struct Boundary {
@@ -58,7 +58,7 @@ impl Boundary {
             refracted_weight: DVec3::ONE,
         };
         let Some((reflectance, cos_t)) = fresnel_dielectric(cos_i, eta) else {
-            boundary.weigh(facing, incoming, material, ior);
+            boundary.weigh(facing, incoming, material, ior, cos_i);
             return boundary;
         };
         boundary.reflectance = reflectance;
@@ -74,26 +74,31 @@ impl Boundary {
             boundary.refracted_weight = DVec3::splat(if down > 0.0 { microfacets.masking(down) } else { 0.0 });
         }
         boundary.refracted = Some(refracted);
-        boundary.weigh(facing, incoming, material, ior);
+        boundary.weigh(facing, incoming, material, ior, cos_i);
         boundary
     }
 
-    /// Weighs what is reflected and refracted with what extensions make of it; `ior`: index inside over that outside.
-    pub fn weigh(&mut self, facing: &Facing, incoming: DVec3, material: &Material, ior: f64) {
+    /// Weighs what is reflected and refracted with what extensions make of it; `ior`: index inside over that outside; `cosine`: to
+    /// the microfacet's normal.
+    pub fn weigh(&mut self, facing: &Facing, incoming: DVec3, material: &Material, ior: f64, cosine: f64) {
         let n = facing.shading_normal;
         let coat = f64::from(material.coat);
-        // It lies outside.
-        let enters = facing.front || material.thin != 0;
-        if enters {
-            self.reflected_weight *= coat_passes(coat, -incoming.dot(n));
+        // It lies outside, and its angle is the same whichever way the light goes.
+        let thin = material.thin != 0;
+        if facing.front || thin {
+            self.reflected_weight *= coat_passes(coat, cosine);
         }
         let Some(refracted) = self.refracted else { return };
-        self.refracted_weight *= coat_passes(coat, -n.dot(if enters { incoming } else { refracted }));
+        let outside = if facing.front { incoming } else { refracted };
+        self.refracted_weight *= coat_passes(coat, if thin { cosine } else { -n.dot(outside) });
+        if material.flags & SPECULAR_CHANGED == 0 {
+            return;
+        }
         // KHR_materials_specular changes the ends of Fresnel's curve.
         let f0 = normal_reflectance(ior);
         let ends = rgb(material.specular_f0) * (f0 / normal_reflectance(f64::from(material.ior)).max(1e-10));
         let grazing = DVec3::splat(f64::from(material.specular_f90));
-        let changed = ends.lerp(grazing, (self.reflectance - f0) / (1.0 - f0));
+        let changed = ends.lerp(grazing, (self.reflectance - f0) / (1.0 - f0)).min(DVec3::ONE);
         self.reflected_weight *= changed / self.reflectance.max(1e-10);
         self.refracted_weight *= (1.0 - changed) / (1.0 - self.reflectance);
     }

@@ -213,7 +213,9 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let incoming = branch.ray.direction;
             let met = Encounter::new(inputs, hit, incoming, branch.medium);
             let (surface, mut facing) = (met.surface, met.facing);
-            if branch.depth == 0 && !facing.front && surface.material.sides & BACK_HIDDEN != 0 {
+            if branch.depth == 0 && !facing.front && surface.material.flags & BACK_HIDDEN != 0 {
+                // What lies behind isn't there by the same chance again.
+                random.next4();
                 branch.ray.origin = surface.origin_towards(incoming);
                 branch.ignored = Some(surface.triangle);
                 continue;

@@ -34,7 +34,7 @@ pub(super) fn choose_light(lights: &[Light], u: f64, digits: [f64; 2]) -> Choice
 
 /// Whether light leaves on the triangle's front, or on its back.
 pub(super) fn emits(material: &Material, front: bool) -> bool {
-    front || material.sides & BACK_EMITS != 0
+    front || material.flags & BACK_EMITS != 0
 }
 
 /// Radiance at this cosine to the normal: a coat lies on lamps too.

@@ -1,5 +1,6 @@
 //! KHR_materials_clearcoat, which the `gltf` crate doesn't know.
 
+use gltf::json::Material;
 use gltf::json::material::NormalTexture;
 use gltf::json::texture::Info;
 use serde::Deserialize;
@@ -16,4 +17,12 @@ pub(super) struct Clearcoat {
     pub clearcoat_roughness_factor: f32,
     pub clearcoat_roughness_texture: Option<Info>,
     pub clearcoat_normal_texture: Option<NormalTexture>,
+}
+
+impl Clearcoat {
+    /// A material's; `None` where it has none.
+    pub(super) fn of(material: &Material) -> Option<serde_json::Result<Self>> {
+        let extension = material.extensions.as_ref()?.others.get(EXTENSION)?;
+        Some(serde_json::from_value(extension.clone()))
+    }
 }

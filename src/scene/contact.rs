@@ -134,6 +134,8 @@ impl Face {
 
     fn touches_any(&self, scene: &Scene<'_>) -> bool {
         let xyz = |[x, y, z, _]: [f32; 4]| Vec3::new(x, y, z);
+        // The boxes of render space know nothing of what instances in them are uncertain by.
+        let uncertain = Vec3::splat(scene.places.iter().map(|place| place.reach).fold(0.0, f32::max));
         let mut stack = vec![(0, None)];
         while let Some((reference, place)) = stack.pop() {
             let first = (reference & !LEAF) as usize;
@@ -141,8 +143,10 @@ impl Face {
                 let node = &scene.records[first];
                 for (low, high) in [(node.row0, node.row1), (node.row2, node.row3)] {
                     let (corner, opposite) = (xyz(low), xyz(high));
-                    let (corner, opposite) =
-                        place.map_or((corner, opposite), |place: &Place| place.place_box(corner, opposite));
+                    let (corner, opposite) = place
+                        .map_or((corner - uncertain, opposite + uncertain), |place: &Place| {
+                            place.place_box(corner, opposite)
+                        });
                     if self.meets_box(corner, opposite) {
                         stack.push((low[3].to_bits(), place));
                     }

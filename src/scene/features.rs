@@ -2,7 +2,7 @@
 
 use crate::layout::{
     BACK_HIDDEN, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH,
-    SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED,
+    SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED,
 };
 
 /// [`Material::surface`] of a mirror.
@@ -98,9 +98,9 @@ impl SceneFeatures {
             features.partly_clear |= mixed;
             features.absorption |= glass && material.absorption != [0.0; 3];
             features.dispersion |= glass && material.dispersion > 0.0;
-            features.culling |= material.sides & BACK_HIDDEN != 0;
+            features.culling |= material.flags & BACK_HIDDEN != 0;
             features.coat |= material.coat > 0.0;
-            features.specular_glass |= glass && is_changed(material);
+            features.specular_glass |= glass && material.flags & SPECULAR_CHANGED != 0;
             features.textured |= triangle.flags & TEXTURED != 0;
             features.alpha |= triangle.flags & SEE_THROUGH != 0;
             features.contact |= triangle.flags & TOUCHED != 0;
@@ -122,14 +122,6 @@ impl SceneFeatures {
         let present = self.constants().into_iter().filter(|(_, present)| *present);
         present.map(|(name, _)| Self::spell(name)).collect()
     }
-}
-
-/// Whether a dielectric reflects another part of the light than its index says: KHR_materials_specular.
-fn is_changed(glass: &Material) -> bool {
-    let textures = [glass.specular_texture, glass.specular_color_texture];
-    let of_ior = ((glass.ior - 1.0) / (glass.ior + 1.0)).powi(2);
-    let is_other = |f0: &f32| (f0 - of_ior).abs() > 1e-6 * of_ior;
-    textures != [NO_TEXTURE; 2] || glass.specular_f90 != 1.0 || glass.specular_f0.iter().any(is_other)
 }
 
 #[cfg(test)]

@@ -178,8 +178,7 @@ impl Reader<'_> {
     }
 
     fn clearcoat(&self) -> Check<Clearcoat> {
-        let extension = self.extension(|extensions| extensions.others.get(coat::EXTENSION));
-        let clearcoat = extension.cloned().map(serde_json::from_value).transpose();
+        let clearcoat = Clearcoat::of(self.json).transpose();
         let clearcoat = clearcoat.map_err(|error| damaged(format_args!("its {}: {error}", coat::EXTENSION)))?;
         Ok(clearcoat.unwrap_or_default())
     }

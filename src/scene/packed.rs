@@ -8,13 +8,13 @@ use glam::{DVec3, Vec3, Vec4};
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::object_grid::object_grids;
 use super::{
-    Alpha, Dielectric, Environment, Gloss, MaterialTextures, Scene, Surface, area, bvh, contact, environment,
+    Alpha, Dielectric, Environment, Gloss, MaterialTextures, SHARED, Scene, Surface, area, bvh, contact, environment,
     light_table,
 };
 use crate::layout::{
     BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Instance, Light, MASK,
-    Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED, TOUCHED,
-    TRIANGLE_LIGHT, TextureLookup,
+    Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED, ShadingTriangle,
+    TEXTURED, TOUCHED, TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// What the ray stages read, in the order of the BVH's leaves.
@@ -221,7 +221,15 @@ fn shading_triangle(scene: &Scene, index: u32, material_index: u32, corners: &[V
     let normals = triangle.vertices.map(|vertex| scene.normals[vertex as usize]);
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     let geometric = (b - a).cross(c - a).normalize().as_vec3();
-    let smooth_shaded = normals.iter().any(|normal| normal.dot(geometric) < 0.999_999);
+    // A placement may stretch the difference.
+    let flat = if triangle.object == SHARED {
+        1.0 - 1e-12
+    } else {
+        0.999_999
+    };
+    let smooth_shaded = normals
+        .iter()
+        .any(|normal| normal.as_dvec3().dot(geometric.as_dvec3()) < flat);
     let vertex = |i: usize| {
         let p = corners[i];
         [p.x, p.y, p.z, f32::from_bits(encode_direction(normals[i]))]
@@ -263,12 +271,12 @@ fn material(material: &super::Material) -> Material {
         Alpha::Mask { alpha, cutoff } => (MASK, alpha, cutoff),
         Alpha::Blend { alpha } => (BLEND, alpha, 0.0),
     };
-    Material {
+    let mut packed = Material {
         base_color: material.base_color.to_array(),
         surface,
         emission: material.emission.to_array(),
         ior: inside.ior,
-        sides: if material.back_emits { BACK_EMITS } else { 0 } | if material.back_hidden { BACK_HIDDEN } else { 0 },
+        flags: if material.back_emits { BACK_EMITS } else { 0 } | if material.back_hidden { BACK_HIDDEN } else { 0 },
         metallic: gloss.metallic,
         roughness: glass.map_or(gloss.roughness, |glass| glass.roughness),
         transmission: inside.transmission,
@@ -296,7 +304,19 @@ fn material(material: &super::Material) -> Material {
         coat_normal_scale: textures.coat_normal.map_or(0.0, |(_, scale)| scale),
         padding0: 0,
         padding1: 0,
+    };
+    if surface == DIELECTRIC && is_changed(&packed) {
+        packed.flags |= SPECULAR_CHANGED;
     }
+    packed
+}
+
+/// Whether a dielectric reflects another part of the light than its index says: KHR_materials_specular.
+fn is_changed(glass: &Material) -> bool {
+    let textures = [glass.specular_texture, glass.specular_color_texture];
+    let of_ior = ((glass.ior - 1.0) / (glass.ior + 1.0)).powi(2);
+    let is_other = |f0: &f32| (f0 - of_ior).abs() > 1e-6 * of_ior;
+    textures != [NO_TEXTURE; 2] || glass.specular_f90 != 1.0 || glass.specular_f0.iter().any(is_other)
 }
 
 fn texture_corners(scene: &Scene, order: &[u32]) -> Vec<Corner> {

@@ -7,6 +7,7 @@ use gltf::json::{Mesh, Root, mesh};
 
 use super::accessor::Integers;
 use super::attributes::Attributes;
+use super::coat::Clearcoat;
 use super::diagnostic::{Check, Warnings, damaged, label};
 use super::document::Document;
 use super::instance::Corner;
@@ -155,9 +156,11 @@ pub(super) fn primitive_label(mesh_index: usize, mesh: &Mesh, primitive_index: u
     format!("{mesh}, primitive {primitive_index}")
 }
 
-/// The set of texture coordinates that a material's normal texture is looked up by, if it has one.
+/// The set of texture coordinates that a material's normal texture is looked up by, or else that of its coat, if it has one.
 fn normal_texture_set(document: &Document, material: usize) -> Option<usize> {
-    let texture = document.root.materials.get(material)?.normal_texture.as_ref()?;
+    let material = document.root.materials.get(material)?;
+    let of_coat = Clearcoat::of(material).and_then(|clearcoat| clearcoat.ok()?.clearcoat_normal_texture);
+    let texture = material.normal_texture.as_ref().or(of_coat.as_ref())?;
     let extensions = texture.extensions.as_ref();
     let transform = extensions.and_then(|extensions| extensions.others.get("KHR_texture_transform"));
     let set = transform.and_then(|transform| transform.get("texCoord")?.as_u64());

@@ -124,3 +124,26 @@ fn the_back_of_a_surface_with_one_side_is_seen_in_mirrors_alone() {
         }
     }
 }
+
+/// The chance by which the hidden back isn't there is another one than that of what lies behind it.
+#[test]
+fn half_a_sheet_behind_the_hidden_back_of_another_shows_half() {
+    const SIDE: usize = 16;
+    let half = |mut material: serde_json::Value| {
+        material["alphaMode"] = "BLEND".into();
+        material["pbrMetallicRoughness"]["baseColorFactor"][3] = 0.5.into();
+        material
+    };
+    let mut scene = Document::new("sheets");
+    let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
+    let at = |z: f64| Mesh::quad(corners.map(|[x, y]| dvec3(x, y, z)));
+    let hidden = scene.material(half(one_sided(matte("hidden", [0.0; 3]))));
+    let black = scene.material(half(matte("black", [0.0; 3])));
+    scene.object("hidden", &at(0.0), hidden);
+    scene.object("black", &at(-0.1), black);
+    scene.camera([0.0, 1.0], [0.0, 0.0], 20.0);
+    let subject = subject_under(scene, Some(Environment::constant(Vec3::ONE)));
+    let all = Region::around([SIDE / 2; 2], SIDE / 2);
+    let measured = measure(&subject, small(SIDE as u32, 100), 64, |image| vec![all.of(image, 0)]);
+    measured[0].assert_is(0.5, "half a black sheet before radiance 1");
+}

@@ -5,7 +5,7 @@ use ppm_vk::config::{Direct, RenderConfig};
 use ppm_vk::cpu::Reflector;
 use serde_json::{Value, json};
 
-use crate::document::{Document, emitting, glass, light, matte, metallic_roughness, mirror};
+use crate::document::{Document, Filter, emitting, glass, light, matte, metallic_roughness, mirror, png, with_texture};
 use crate::gloss::{albedo, metal, plastic};
 use crate::lamp::{self, assert_floor_is_lit_by};
 use crate::measure::{Region, measure};
@@ -33,7 +33,7 @@ fn schlick(cosine: f64) -> f64 {
 /// The radiance of a plate of this material in a room whose walls all have radiance 1, as a function of the cosine to the
 /// viewer.
 fn assert_plate_shows(
-    material: Value,
+    material: impl FnOnce(&mut Document) -> Value,
     direct: Direct,
     photons: u32,
     what: &str,
@@ -41,6 +41,7 @@ fn assert_plate_shows(
     tolerance: f64,
 ) {
     let mut scene = Document::new("plate");
+    let material = material(&mut scene);
     let plate = scene.material(material);
     let wall = scene.material(light("wall", [1.0; 3]));
     scene.object("plate", &Mesh::facing_up(0.9, 0.0), plate);
@@ -122,7 +123,7 @@ fn a_coated_plate_in_uniform_light_shows_its_coat_and_its_base() {
             let what = format!("{} under {factor} of a coat of roughness {roughness}", material["name"]);
             let expected = |cosine| whole_albedo(below, cosine) + whole_albedo(coat, cosine);
             let material = coated(material.clone(), factor, roughness);
-            assert_plate_shows(material, direct, 20_000, &what, expected, 1e-3);
+            assert_plate_shows(|_| material, direct, 20_000, &what, expected, 1e-3);
         }
     }
 }
@@ -136,14 +137,39 @@ fn a_smooth_coat_reflects_by_schlicks_curve_of_index_1_5() {
         json!({"specularFactor": 0}),
     );
     let expected = |cosine: f64| 0.8 * schlick(cosine);
-    assert_plate_shows(coated(black, 0.8, 0.0), Direct::Light, 100, "a coat", expected, 1e-3);
+    assert_plate_shows(
+        |_| coated(black, 0.8, 0.0),
+        Direct::Light,
+        100,
+        "a coat",
+        expected,
+        1e-3,
+    );
+}
+
+/// Its normals lean by 30° across the view; those of the base, and the mesh, which has no tangents, don't.
+#[test]
+fn a_coat_has_normals_of_its_own() {
+    let lean = 30_f64.to_radians();
+    let leaning = |scene: &mut Document| {
+        let value = |part: f64| (127.5 + 127.5 * part).round() as u8;
+        let texel = [value(lean.sin()), value(0.0), value(lean.cos()), 255];
+        let normals = scene.texture(&png(1, 1, |_, _| texel), Filter::Nearest);
+        let slot = "/extensions/KHR_materials_clearcoat/clearcoatNormalTexture";
+        let nothing = json!({"specularFactor": 0});
+        let black = with_extension(matte("black", [0.0; 3]), "KHR_materials_specular", nothing);
+        with_texture(coated(black, 1.0, 0.0), slot, normals)
+    };
+    // Of bytes, the angle is right to 0.3°.
+    let expected = |cosine: f64| schlick(lean.cos() * cosine);
+    assert_plate_shows(leaning, Direct::Light, 100, "a leaning coat", expected, 1e-2);
 }
 
 /// A thin wall sees radiance 1 on both sides: coat and wall together lose nothing.
 #[test]
 fn a_coated_pane_vanishes_in_uniform_light() {
     let pane = coated(glass("pane", 0.0, 1.0, None), 1.0, 0.0);
-    assert_plate_shows(pane, Direct::Light, 100, "a coated pane", |_| 1.0, 1e-6);
+    assert_plate_shows(|_| pane, Direct::Light, 100, "a coated pane", |_| 1.0, 1e-6);
 }
 
 /// Over a black plate a pane shows what it reflects: Fresnel's curve with the ends that KHR_materials_specular gives it.
@@ -164,7 +190,7 @@ fn panes_reflect_as_their_specular_factor_and_colour_say() {
         let f0 = f64::min(0.04 * red, 1.0) * factor;
         let expected = |cosine| f0 + (factor - f0) * (fresnel(cosine) - 0.04) / 0.96;
         let what = format!("specular {factor}, red {red}");
-        assert_plate_shows(pane, Direct::Light, 100, &what, expected, 2e-3);
+        assert_plate_shows(|_| pane, Direct::Light, 100, &what, expected, 2e-3);
     }
 }
 
