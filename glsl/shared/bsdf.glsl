@@ -116,6 +116,38 @@ Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float ou
     return boundary;
 }
 
+// BSDF · cosine of a rough boundary between the viewer's side and a direction on either side; radiance's factor included.
+vec3 rough_boundary(Facing facing, Material material, float outside, vec3 tint, vec3 v, vec3 l) {
+    vec3 n = facing.shading_normal;
+    float alpha = material.roughness * material.roughness;
+    float ior = material.ior / outside;
+    float eta = facing.front || is_thin(material) ? 1.0 / ior : ior;
+    float nv = dot(n, v);
+    float nl = abs(dot(n, l));
+    float root_v = masking_root(alpha, nv);
+    float root_l = masking_root(alpha, nl);
+    float cos_t;
+    if (dot(n, l) > 0.0 || is_thin(material)) {
+        vec3 up = dot(n, l) > 0.0 ? l : l - 2.0 * dot(n, l) * n;
+        vec3 h = normalize(v + up);
+        float f = fresnel_dielectric(dot(v, h), eta, cos_t);
+        float d = ggx(alpha, n, h) * nl;
+        return dot(n, l) > 0.0 ? vec3(f * d * 0.5 / (nl * root_v + nv * root_l))
+                               : tint * ((1.0 - f) * d / ((nl + root_l) * (nv + root_v)));
+    }
+    // By the normal that refracts the one into the other: Walter and others, «Microfacet Models for Refraction through Rough
+    // Surfaces», Eurographics Symposium on Rendering, 2007.
+    vec3 across = eta * v + l;
+    float length2 = dot(across, across);
+    vec3 h = across * inversesqrt(max(length2, 1e-20));
+    h = dot(h, n) < 0.0 ? -h : h;
+    float cos_i = dot(v, h);
+    float f = fresnel_dielectric(cos_i, eta, cos_t);
+    bool possible = cos_i > 0.0 && dot(l, h) < 0.0 && f < 1.0 && length2 > 1e-12;
+    float density = ggx(alpha, n, h) * 2.0 * cos_i / (nv + root_v) * cos_t / length2;
+    return possible ? tint * (eta * eta * (1.0 - f) * density * 2.0 * nl / (nl + root_l)) : vec3(0.0);
+}
+
 float largest(vec3 v) {
     return max(v.x, max(v.y, v.z));
 }

@@ -80,31 +80,46 @@ Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium, Random r
     return Glimpse(emission, dark);
 }
 
-// What a narrow reflection shows of the lights without extent, which no direction of it meets: by a ray to one of them or, where
-// visible points are found once, to each.
-vec3 glint(Surface surface, Facing facing, Reflector reflector, vec3 viewer, inout Random random) {
+// What a narrow reflection, or a rough boundary of glass, shows of the lights without extent, which no direction from it meets:
+// by a ray to one of them or, where visible points are found once, to each.
+vec3 glint(Encounter met, Material material, vec3 viewer, inout Random random) {
     vec4 u = next4(random);
     uint chosen = choose_light(u.x, u.yz).light;
     bool of_one = settings.slots_per_pixel == 1u;
     uint begin = of_one ? chosen : 0u;
     uint end = of_one ? chosen + 1u : settings.light_count;
-    vec3 origin = offset_origin(surface.position, facing.geometric_normal, surface.reach);
-    reflector.diffuse = vec3(0.0);
+    Facing facing = met.facing;
     vec3 sum = vec3(0.0);
     for (uint i = begin; i < end && !loops_cut; i++) {
         Light light = light_at(i);
         if (!is_punctual(light.kind)) {
             continue;
         }
-        Arriving arriving = arriving_from(punctual_light_at(i), light.kind, origin);
+        PunctualLight punctual = punctual_light_at(i);
+        vec3 origin = origin_towards(met.surface, arriving_from(punctual, light.kind, met.surface.position).ray);
+        Arriving arriving = arriving_from(punctual, light.kind, origin);
         vec3 direction = normalize(arriving.ray);
         float cosine = dot(direction, facing.shading_normal);
-        bool faces = cosine > 0.0 && dot(direction, facing.geometric_normal) > 0.0 && largest(arriving.irradiance) > 0.0;
-        if (faces && trace_visible(origin, arriving.ray, arriving.end, MISS, true, random).triangle == MISS) {
-            float probability = of_one ? light.probability : 1.0;
-            sum += brdf(reflector, facing.shading_normal, viewer, direction) * arriving.irradiance *
-                   (cosine / probability);
+        bool above = dot(direction, facing.geometric_normal) > 0.0;
+        bool fits = above ? cosine > 0.0 : cosine < 0.0 && is_dielectric(material);
+        if (!fits || largest(arriving.irradiance) <= 0.0 || dot(viewer, facing.shading_normal) <= 0.0) {
+            continue;
         }
+        if (trace_visible(origin, arriving.ray, arriving.end, MISS, true, random).triangle != MISS) {
+            continue;
+        }
+        vec3 value;
+        if (is_dielectric(material)) {
+            value = rough_boundary(facing, material, met.outside, met.tint, viewer, direction);
+            if (ABSORPTION) {
+                value *= transmittance(above ? met.through : met.beyond, length(arriving.ray) * arriving.end);
+            }
+        } else {
+            Reflector reflector = reflector_of(material);
+            reflector.diffuse = vec3(0.0);
+            value = cosine * brdf(reflector, facing.shading_normal, viewer, direction);
+        }
+        sum += value * arriving.irradiance / (of_one ? light.probability : 1.0);
     }
     return sum;
 }
@@ -206,7 +221,7 @@ void main() {
                     branch.direction = mirror_direction(facing, branch.direction);
                 } else if (is_glossy(material)) {
                     if (PUNCTUAL_LIGHTS && reflector.alpha >= SMOOTH_ALPHA) {
-                        branch.emitted += branch.throughput * glint(surface, facing, reflector, viewer, random);
+                        branch.emitted += branch.throughput * glint(met, material, viewer, random);
                     }
                     Branch reflected = branch;
                     float p = reflection_probability(reflector, dot(viewer, facing.shading_normal));
@@ -229,6 +244,10 @@ void main() {
                 } else if (DIELECTRICS) {
                     if (DISPERSION) {
                         branch.throughput *= disperse(material, branch.wavelength, random);
+                    }
+                    bool rough = ROUGH_GLASS && material.roughness * material.roughness >= SMOOTH_ALPHA;
+                    if (PUNCTUAL_LIGHTS && rough) {
+                        branch.emitted += branch.throughput * glint(met, material, viewer, random);
                     }
                     Boundary boundary = meet_boundary(facing, branch.direction, material, met.outside, u.yz);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.

@@ -9,18 +9,18 @@ use rayon::prelude::*;
 use super::contact::{Encounter, choose_part, is_mixed, transmittance};
 use super::dispersion::disperse;
 use super::environment::Environment;
-use super::gloss::{FOLLOWED_ALPHA, Reflector};
+use super::gloss::{FOLLOWED_ALPHA, Reflector, SMOOTH_ALPHA};
 use super::intersect::Ray;
 use super::light::{Arriving, arriving_from, choose_light, emits, is_punctual};
 use super::random::{PathKind, Random};
 use super::sampling::{disc_point, encode_direction};
-use super::surface::{Boundary, Facing, GLOSSY, MATTE, MIRROR, Surface};
+use super::surface::{Boundary, DIELECTRIC, Facing, GLOSSY, MATTE, MIRROR, Surface, rough_boundary};
 use super::texture::nearest_visible;
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{Gloss, Light, NO_OBJECT, VisiblePoint};
+use crate::layout::{Gloss, Light, Material, NO_OBJECT, VisiblePoint};
 
 /// What is left of a path that splits.
 #[derive(Clone, Copy)]
@@ -58,36 +58,41 @@ fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u
     }
 }
 
-/// What a narrow reflection shows of the lights without extent, which no direction of it meets.
-fn glint(
-    inputs: &Inputs<'_>,
-    surface: &Surface,
-    facing: &Facing,
-    reflector: &Reflector,
-    viewer: DVec3,
-    random: &mut Random,
-) -> DVec3 {
+/// What a narrow reflection, or a rough boundary of glass, shows of the lights without extent, which no direction from it meets.
+fn glint(inputs: &Inputs<'_>, met: &Encounter, material: &Material, viewer: DVec3, random: &mut Random) -> DVec3 {
     let [u, first_digits, second_digits, _] = random.next4();
     let lights = &inputs.scene.lights;
     let chosen = choose_light(lights, u, [first_digits, second_digits]).light;
     let of_one = inputs.settings.slots_per_pixel == 1;
     let asked = if of_one { std::slice::from_ref(chosen) } else { lights };
-    let origin = surface.origin_towards(facing.geometric_normal);
+    let (surface, facing) = (&met.surface, &met.facing);
+    let is_glass = material.surface == DIELECTRIC;
     let boundary = Reflector {
         diffuse: DVec3::ZERO,
-        ..*reflector
+        ..Reflector::of_material(material)
     };
     let from = |light: &Light| {
+        let origin = surface.origin_towards(arriving_from(light, surface.position).ray);
         let Arriving { ray, end, irradiance } = arriving_from(light, origin);
         let direction = ray.normalize();
         let cosine = direction.dot(facing.shading_normal);
-        let faces = cosine > 0.0 && direction.dot(facing.geometric_normal) > 0.0 && irradiance.max_element() > 0.0;
-        let ray = Ray { origin, direction: ray };
-        if !faces || nearest_visible(inputs, ray, end, None, random).is_some() {
+        let above = direction.dot(facing.geometric_normal) > 0.0;
+        let fits = if above { cosine > 0.0 } else { cosine < 0.0 && is_glass };
+        if !fits || irradiance.max_element() <= 0.0 || viewer.dot(facing.shading_normal) <= 0.0 {
             return DVec3::ZERO;
         }
-        let probability = if of_one { f64::from(light.probability) } else { 1.0 };
-        boundary.brdf(facing.shading_normal, viewer, direction) * irradiance * (cosine / probability)
+        let to_light = Ray { origin, direction: ray };
+        if nearest_visible(inputs, to_light, end, None, random).is_some() {
+            return DVec3::ZERO;
+        }
+        let value = if is_glass {
+            let medium = if above { met.through } else { met.beyond };
+            rough_boundary(facing, material, met.outside, met.tint, [viewer, direction])
+                * transmittance(inputs, medium, ray.length() * end)
+        } else {
+            cosine * boundary.brdf(facing.shading_normal, viewer, direction)
+        };
+        value * irradiance / if of_one { f64::from(light.probability) } else { 1.0 }
     };
     asked.iter().filter(|light| is_punctual(light)).map(from).sum()
 }
@@ -237,7 +242,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             };
             let incoming = branch.ray.direction;
             let met = Encounter::new(inputs, hit, incoming, branch.medium);
-            let (surface, facing) = (met.surface, met.facing);
+            let (surface, facing) = (&met.surface, &met.facing);
             branch.throughput *= transmittance(inputs, met.through, hit.t);
             let base_color = rgb(surface.material.base_color);
             if emits(&surface.material, facing.front) {
@@ -262,7 +267,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 Reflector::matte(base_color)
             };
             if is_matte || (is_glossy && reflector.alpha >= FOLLOWED_ALPHA) {
-                break seen(inputs, &branch, &surface, &facing, reflector);
+                break seen(inputs, &branch, surface, facing, reflector);
             }
             if branch.depth + 1 >= settings.max_depth {
                 counts.add_truncated(1);
@@ -273,8 +278,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let [choice, second, third, _] = random.next4();
             if is_glossy {
                 if inputs.scene.features.punctual && !reflector.is_smooth() {
-                    let seen = glint(inputs, &surface, &facing, &reflector, -incoming, &mut random);
-                    branch.emitted += branch.throughput * seen;
+                    branch.emitted += branch.throughput * glint(inputs, &met, &material, -incoming, &mut random);
                 }
                 let p = reflector.reflection_probability(-incoming.dot(facing.shading_normal));
                 let (direction, weight) = facing.follow(&reflector, incoming, [second, third]);
@@ -305,14 +309,18 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 } else {
                     branch.throughput /= 1.0 - p;
                 }
-                break seen(inputs, &branch, &surface, &facing, stopping);
+                break seen(inputs, &branch, surface, facing, stopping);
             }
             branch.ray.direction = if kind == MIRROR {
                 branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
                 facing.reflect(incoming)
             } else {
                 branch.throughput *= disperse(&mut material, &mut branch.wavelength, &mut random);
-                let boundary = Boundary::new(&facing, incoming, &material, met.outside, [second, third]);
+                let rough = f64::from(material.roughness).powi(2) >= SMOOTH_ALPHA;
+                if inputs.scene.features.punctual && rough {
+                    branch.emitted += branch.throughput * glint(inputs, &met, &material, -incoming, &mut random);
+                }
+                let boundary = Boundary::new(facing, incoming, &material, met.outside, [second, third]);
                 // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
                 let transmission = met.tint * boundary.eta.powi(2) * boundary.refracted_weight;
                 match boundary.refracted {

@@ -175,6 +175,12 @@ impl Reflector {
         2.0 * cosine / (cosine + self.masking_root(cosine))
     }
 
+    /// Density of [`Self::visible_normal`].
+    pub(super) fn visible_density(&self, n: DVec3, v: DVec3, h: DVec3) -> f64 {
+        let nv = n.dot(v).max(1e-6);
+        self.ggx(n, h) * 2.0 * v.dot(h).max(0.0) / (nv + self.masking_root(nv))
+    }
+
     /// Its density per solid angle.
     pub fn reflected_density(&self, n: DVec3, v: DVec3, l: DVec3) -> f64 {
         let nv = n.dot(v).max(1e-6);

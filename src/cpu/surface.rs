@@ -266,6 +266,60 @@ impl Boundary {
     }
 }
 
+/// BSDF · cosine of a rough boundary between the viewer's side and a direction on either side: `glsl/shared/bsdf.glsl`, which
+/// cites the source.
+pub(super) fn rough_boundary(
+    facing: &Facing,
+    material: &Material,
+    outside: f64,
+    tint: DVec3,
+    [v, l]: [DVec3; 2],
+) -> DVec3 {
+    let n = facing.shading_normal;
+    let microfacets = Reflector::matte(DVec3::ZERO).with_alpha(f64::from(material.roughness).powi(2));
+    let thin = material.thin != 0;
+    let ior = f64::from(material.ior) / outside;
+    let eta = if facing.front || thin { ior.recip() } else { ior };
+    let (nv, nl) = (n.dot(v), n.dot(l).abs());
+    let is_reflected = n.dot(l) > 0.0;
+    if is_reflected || thin {
+        let up = if is_reflected { l } else { l - 2.0 * n.dot(l) * n };
+        let f = fresnel(v.dot((v + up).normalize()), eta).map_or(1.0, |(f, _)| f);
+        // Density of what v's visible normals reflect.
+        let density = microfacets.reflected_density(n, v, up);
+        return if is_reflected {
+            DVec3::splat(f * density * microfacets.joint_masking(nv, nl))
+        } else {
+            tint * ((1.0 - f) * density * microfacets.masking(nl))
+        };
+    }
+    let across = eta * v + l;
+    let Some(h) = across.try_normalize() else {
+        return DVec3::ZERO;
+    };
+    let h = if h.dot(n) < 0.0 { -h } else { h };
+    match fresnel(v.dot(h), eta) {
+        Some((f, cos_t)) if v.dot(h) > 0.0 && l.dot(h) < 0.0 && across.length_squared() > 1e-12 => {
+            let of_normal = microfacets.visible_density(n, v, h);
+            let density = of_normal * cos_t / across.length_squared();
+            tint * (eta * eta * (1.0 - f) * density * microfacets.masking(nl))
+        }
+        _ => DVec3::ZERO,
+    }
+}
+
+/// Unpolarised reflectance and the cosine on the other side; `None` for total internal reflection.
+fn fresnel(cos_i: f64, eta: f64) -> Option<(f64, f64)> {
+    let sin2_t = eta * eta * (1.0 - cos_i * cos_i).max(0.0);
+    if sin2_t >= 1.0 {
+        return None;
+    }
+    let cos_t = (1.0 - sin2_t).sqrt();
+    let parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    let perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    Some((0.5 * (parallel.powi(2) + perpendicular.powi(2)), cos_t))
+}
+
 #[cfg(test)]
 mod tests {
     use bytemuck::Zeroable;
@@ -326,6 +380,49 @@ mod tests {
                 let moved = offset_origin(position, n, position.abs()) - position;
                 assert!(moved.dot(n) > 0.0, "{moved} doesn't lead to the side of {n}");
                 assert!(moved.length() < 2e-6 * position.length(), "{moved} is far");
+            }
+        }
+    }
+
+    /// What a rough boundary does to light from each direction adds up to what its sampled directions weigh: above, and below.
+    #[test]
+    fn rough_glass_is_evaluated_as_it_is_sampled() {
+        const STEPS: u32 = 600;
+        let at = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS);
+        for (front, thin, cosine) in [
+            (true, 0, 0.9),
+            (true, 0, 0.3),
+            (false, 0, 0.9),
+            (false, 0, 0.5),
+            (true, 1, 0.6),
+        ] {
+            let facing = facing(front);
+            let material = Material {
+                roughness: 0.6,
+                thin,
+                ..glass()
+            };
+            let v = DVec3::new((1.0_f64 - cosine * cosine).sqrt(), 0.0, cosine);
+            let mut evaluated = [0.0; 2];
+            let mut sampled = [0.0; 2];
+            for (i, j) in (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (at(i), at(j)))) {
+                let z = 2.0 * i - 1.0;
+                let (sin, cos) = (2.0 * PI * j).sin_cos();
+                let across = (1.0 - z * z).sqrt();
+                let l = DVec3::new(across * cos, across * sin, z);
+                let value = rough_boundary(&facing, &material, 1.0, DVec3::ONE, [v, l]).x;
+                evaluated[usize::from(z < 0.0)] += 4.0 * PI * value;
+                let boundary = Boundary::new(&facing, -v, &material, 1.0, [j, i]);
+                sampled[0] += boundary.reflectance * boundary.reflected_weight;
+                let passed = (1.0 - boundary.reflectance) * boundary.eta.powi(2) * boundary.refracted_weight;
+                sampled[1] += boundary.refracted.map_or(0.0, |_| passed);
+            }
+            for (evaluated, sampled) in evaluated.into_iter().zip(sampled) {
+                let [evaluated, sampled] = [evaluated, sampled].map(|sum| sum / f64::from(STEPS * STEPS));
+                assert!(
+                    (evaluated - sampled).abs() < 2e-3 * sampled.max(0.1),
+                    "front {front}, thin {thin}, cosine {cosine}: {evaluated} instead of {sampled}"
+                );
             }
         }
     }
