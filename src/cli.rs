@@ -16,6 +16,7 @@ mod list;
 mod outputs;
 mod progress;
 mod render;
+mod scene;
 
 use std::io::Write as _;
 
@@ -48,7 +49,7 @@ pub fn run() -> Result<Outcome> {
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Converge(arguments)) => converge::run(&arguments),
         Some(Command::Gathers) => print(&list::gathers()?),
-        Some(Command::Inspect { scene, json }) => print(&list::inspect(&scene, json)?),
+        Some(Command::Inspect { scene, read, json }) => print(&list::inspect(&scene, &read, json)?),
     }
 }
 

@@ -22,6 +22,11 @@ pub const ENVIRONMENT_LIGHT: u32 = 4;
 /// Bit of a reference to a [`BvhRecord`]: it is a triangle of a leaf.
 pub const LEAF: u32 = 1 << 31;
 
+/// Kind of a leaf's [`BvhRecord`]: where an instance puts its triangles. The next record is its [`RAY_RECORD`].
+pub const PLACEMENT_RECORD: u32 = 1;
+/// Kind of a leaf's [`BvhRecord`]: how rays come to the space of an instance's triangles.
+pub const RAY_RECORD: u32 = 2;
+
 /// Bit of [`ShadingTriangle::flags`]: the shading normals differ from the geometric one.
 pub const SMOOTH_SHADED: u32 = 1;
 /// Bit of [`ShadingTriangle::flags`]: a dielectric's, and it may lie on a face of another object.
@@ -31,6 +36,11 @@ pub const TOUCHED: u32 = 2;
 pub const TEXTURED: u32 = 4;
 /// Bit of [`ShadingTriangle::flags`]: parts of it may not be there, see [`Material::alpha_mode`].
 pub const SEE_THROUGH: u32 = 8;
+
+/// [`Material::sides`]: the back emits as the front does.
+pub const BACK_EMITS: u32 = 1;
+/// [`Material::sides`]: no camera sees the back.
+pub const BACK_HIDDEN: u32 = 2;
 
 /// Texture of a material that has none there.
 pub const NO_TEXTURE: u32 = u32::MAX;
@@ -111,11 +121,11 @@ device_structs! {
         pub seed: u32,
         /// Lights.
         pub light_count: u32,
-        /// Zero.
-        pub padding: u32,
+        /// Instances.
+        pub instance_count: u32,
         /// Bounces of a path at the most.
         pub max_depth: u32,
-        /// Triangles.
+        /// Triangles that instances don't share. Those come first.
         pub triangle_count: u32,
         /// Invocations of the photon stage.
         pub photon_lanes: u32,
@@ -135,17 +145,35 @@ device_structs! {
         pub bsdf_sampling: f32,
     }
 
-    /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf. Records refer to each
-    /// other by index; a reference with [`LEAF`] set is to the first triangle of a leaf, whose others follow it.
+    /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf, or one of the two of an
+    /// instance. Records refer to each other by index; a reference with [`LEAF`] set is to the first record of a leaf, whose
+    /// others follow it. An instance is a leaf of its own.
     pub struct BvhRecord: 64 {
-        /// Node: corner of the left box; w: u32 bits, the left reference. Triangle: its first corner.
+        /// Node: corner of the left box; w: u32 bits, the left reference. Triangle: its first corner. Instance: first row of
+        /// the map to render space, or back.
         pub row0: [f32; 4],
-        /// Node: the left box's other corner. Triangle: its second corner.
+        /// Node: the left box's other corner. Triangle: its second corner. Instance: second row.
         pub row1: [f32; 4],
-        /// Node: corner of the right box; w: u32 bits, the right reference. Triangle: its third corner.
+        /// Node: corner of the right box; w: u32 bits, the right reference. Triangle: its third corner. Instance: third row.
         pub row2: [f32; 4],
-        /// Node: the right box's other corner. Triangle: x: u32 bits, its index; y: u32 bits, 1 for a leaf's last.
+        /// Node: the right box's other corner. Leaf: u32 bits: x: index of the triangle or instance, or root of the instance's
+        /// hierarchy; y: 1 for a leaf's last; z: 0, [`PLACEMENT_RECORD`] or [`RAY_RECORD`]. f32: w: of the latter, what the
+        /// hierarchy's boxes are widened by.
         pub row3: [f32; 4],
+    }
+
+    /// Where shared triangles are put.
+    pub struct Instance: 64 {
+        /// Rows of the map to render space.
+        pub rows: [[f32; 4]; 3],
+        /// Index of its object.
+        pub object: u32,
+        /// 1 where fronts become backs.
+        pub mirrored: u32,
+        /// Index of its first triangle.
+        pub first_triangle: u32,
+        /// How many it has.
+        pub triangle_count: u32,
     }
 
     /// Havel and Herout's precomputed triangle.
@@ -166,7 +194,7 @@ device_structs! {
         pub p1: [f32; 4],
         /// Likewise.
         pub p2: [f32; 4],
-        /// Index of its object.
+        /// Index of its object; what instances share has none.
         pub object: u32,
         /// Index of its material.
         pub material: u32,
@@ -211,7 +239,7 @@ device_structs! {
     }
 
     /// A material. Textures are indices of [`TextureLookup`]s, or [`NO_TEXTURE`]; each is a factor.
-    pub struct Material: 128 {
+    pub struct Material: 160 {
         /// Linear RGB albedo, reflectance or tint.
         pub base_color: [f32; 3],
         /// 0 matte, 1 mirror, 2 dielectric, 3 glossy.
@@ -220,8 +248,8 @@ device_structs! {
         pub emission: [f32; 3],
         /// Index of refraction inside.
         pub ior: f32,
-        /// 1 where the back emits as well.
-        pub double_sided: u32,
+        /// [`BACK_EMITS`], [`BACK_HIDDEN`].
+        pub sides: u32,
         /// How far the surface is a metal.
         pub metallic: f32,
         /// Of a glossy surface; its square is GGX's α.
@@ -260,6 +288,22 @@ device_structs! {
         pub alpha: f32,
         /// 20 over the Abbe number of a dielectric; 0: its index is that of every wavelength.
         pub dispersion: f32,
+        /// How much of a clear coat lies above; 0: none.
+        pub coat: f32,
+        /// Its square is GGX's α of the coat.
+        pub coat_roughness: f32,
+        /// Of how much there is of the coat, in red.
+        pub coat_texture: u32,
+        /// Of its roughness, in green.
+        pub coat_roughness_texture: u32,
+        /// Its normals in the space of the tangent.
+        pub coat_normal_texture: u32,
+        /// How far those lean.
+        pub coat_normal_scale: f32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
     }
 
     /// A light, and a cell of the alias table that chooses one. What its kind doesn't use is zero.
@@ -306,10 +350,10 @@ device_structs! {
     pub struct Gloss: 32 {
         /// rgb: albedo under the reflecting boundary; w: u32 bits, octahedral direction to the viewer.
         pub diffuse_viewer: [f32; 4],
-        /// rgb: reflectance of the boundary at normal incidence; w: u32 bits. Lower half an f16, GGX's α, 0 where the path
-        /// followed the reflection itself; then two bytes, of 254 steps: the part that is metal, and the rest's
-        /// reflectance at grazing incidence.
-        pub f0_rest: [f32; 4],
+        /// f16s, two to a word: reflectance of the boundary at normal incidence, linear RGB, and at grazing incidence; GGX's α, 0
+        /// where the path followed the reflection itself; how much of a coat there is; the largest channel of what lies over
+        /// the base at both angles.
+        pub rest: [u32; 4],
     }
 
     /// A photon.

@@ -16,6 +16,8 @@ pub enum BufferId {
     HavelTriangles,
     /// [`crate::layout::ShadingTriangle`]s in the same order.
     ShadingTriangles,
+    /// [`crate::layout::Instance`]s.
+    Instances,
     /// [`crate::layout::Material`]s.
     Materials,
     /// [`crate::layout::Corner`]s, three to a triangle, where the scene is textured.

@@ -413,6 +413,10 @@ fn lists_go_to_stdout() {
             vec!["inspect", scene.to_str().expect("UTF-8")],
             vec!["triangles", "1 mirror", "1 dielectric", "camera 0", "memory", "MiB"],
         ),
+        (
+            vec!["inspect", scene.to_str().expect("UTF-8"), "--environment", "1,1,1"],
+            vec!["environment", "2 emissive"],
+        ),
         (vec!["--help"], vec!["--scene", "--profile-json"]),
         (vec!["--version"], vec!["ppm-vk"]),
     ] {

@@ -9,6 +9,8 @@ mod bench;
 mod coverage;
 #[path = "kernels/gather.rs"]
 mod gather;
+#[path = "kernels/instances.rs"]
+mod instances;
 #[path = "kernels/limits.rs"]
 mod limits;
 #[path = "kernels/oracle.rs"]

@@ -155,7 +155,7 @@ fn converge_follows_the_error_of_each_setting() {
             "--reference",
             "reference.exr",
             "--time",
-            "0.4",
+            "2",
             "--photons",
             "2000",
             "--seed",

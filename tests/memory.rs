@@ -2,6 +2,9 @@
 
 // Each test program uses a part of what they share.
 #[allow(dead_code)]
+#[path = "scene/fixture.rs"]
+mod fixture;
+#[allow(dead_code)]
 #[path = "picture/mod.rs"]
 mod picture;
 
@@ -9,7 +12,9 @@ use ppm_vk::backend::Backend;
 use ppm_vk::config::{Estimator, RenderConfig};
 use ppm_vk::gpu::best_device;
 use ppm_vk::pipeline::Memory;
+use serde_json::json;
 
+use fixture::Fixture;
 use picture::{Subject, small};
 
 #[test]
@@ -20,6 +25,7 @@ fn a_render_takes_the_memory_that_was_foretold() {
         ("glossy", Estimator::Sppm),
         ("pool", Estimator::Ppm),
         ("glasses", Estimator::Ppm),
+        ("instances", Estimator::Sppm),
     ] {
         let subject = Subject::named(name);
         let config = RenderConfig {
@@ -42,4 +48,43 @@ fn a_render_takes_the_memory_that_was_foretold() {
         );
         assert!(later <= at_first, "{name}: {later} bytes after {at_first}");
     }
+}
+
+/// The room and so many nodes that show one mesh of 10,082 triangles.
+fn with_nodes(count: u32) -> Subject {
+    const SIDE: u16 = 71;
+    let mut room = Fixture::room();
+    let place = |number: u16| f32::from(number) / f32::from(SIDE) - 0.5;
+    let vertices = (0..=SIDE).flat_map(|z| (0..=SIDE).map(move |x| [place(x), place(x) * place(z), place(z)]));
+    let corner = |x: u16, z: u16| z * (SIDE + 1) + x;
+    let squares = (0..SIDE).flat_map(|z| (0..SIDE).map(move |x| (x, z)));
+    let triangles = squares.flat_map(|(x, z)| {
+        let [a, b, c, d] = [corner(x, z), corner(x, z + 1), corner(x + 1, z + 1), corner(x + 1, z)];
+        [a, b, c, a, c, d]
+    });
+    let positions = room.add_vectors(&vertices.collect::<Vec<_>>());
+    let indices = room.add_indices(&triangles.collect::<Vec<_>>());
+    let primitive = json!({"attributes": {"POSITION": positions}, "indices": indices, "material": 0});
+    room.set("/meshes/-", json!({"primitives": [primitive]}));
+    for number in 0..count {
+        let turn = f64::from(number);
+        room.add_root(json!({
+            "mesh": 2, "translation": [0.7 * turn.sin(), 0.5, 0.7 * turn.cos()], "scale": [0.1, 0.2, 0.1],
+            "rotation": [0, (0.3 * turn).sin(), 0, (0.3 * turn).cos()]
+        }));
+    }
+    Subject::of(room.scene())
+}
+
+#[test]
+fn a_thousand_instances_of_a_mesh_take_hardly_more_memory_than_one_node() {
+    let device = best_device().expect("a Vulkan device");
+    let bytes = |subject: &Subject| Memory::of(&subject.packed, &small(160, 20_000), &device).scene;
+    let (one, thousand) = (with_nodes(1), with_nodes(1000));
+    println!("{} bytes for one, {} for a thousand", bytes(&one), bytes(&thousand));
+    assert_eq!((one.packed.instances.len(), thousand.packed.instances.len()), (0, 1000));
+    assert_eq!(thousand.packed.seen_triangles(), 3 + 1000 * 10_082);
+    assert!(4 * bytes(&thousand) < 5 * bytes(&one));
+    // And of the host.
+    assert_eq!(thousand.scene.positions.len(), one.scene.positions.len());
 }

@@ -6,6 +6,8 @@
 
 #[path = "right/camera.rs"]
 mod camera;
+#[path = "right/coat.rs"]
+mod coat;
 #[path = "right/convergence.rs"]
 mod convergence;
 #[path = "../examples/make_scenes/scenes/document.rs"]

@@ -32,6 +32,8 @@ mod lights;
 mod materials;
 #[path = "scene/mutation.rs"]
 mod mutation;
+#[path = "scene/sharing.rs"]
+mod sharing;
 #[path = "scene/tangents.rs"]
 mod tangents;
 #[path = "scene/textures.rs"]

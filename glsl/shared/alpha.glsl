@@ -2,7 +2,7 @@
 
 // As `trace`, by chance through what is there in part: a pure function of the ray's place in its path. A ray goes on a step
 // behind what it has passed: faces in one place are passed as one.
-Hit trace_visible(vec3 origin, vec3 direction, float t_max, uint ignored, bool any, Random random) {
+Hit trace_visible(vec3 origin, vec3 direction, float t_max, PlacedTriangle ignored, bool any, Random random) {
     if (ALPHA) {
         any = false;
     }
@@ -15,13 +15,13 @@ Hit trace_visible(vec3 origin, vec3 direction, float t_max, uint ignored, bool a
         hit = trace(from, direction, t_max - passed, ignored, any);
         goes_on = ALPHA && hit.triangle != MISS && !loops_cut;
         if (goes_on) {
-            Surface met = surface_at(hit.triangle, vec2(hit.u, hit.v));
+            Surface met = surface_at(hit);
             goes_on = of_passage(random, number) >= share_there(met);
             if (goes_on) {
                 from = origin_towards(met, direction);
                 passed = dot(from - origin, direction) / dot(direction, direction);
                 number += 1u;
-                ignored = hit.triangle;
+                ignored = triangle_of(hit);
             }
         }
     }

@@ -13,11 +13,15 @@ float fresnel_dielectric(float cos_i, float eta, out float cos_t) {
     return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
+// A dielectric's reflectance at normal incidence.
+float normal_reflectance(float ior) {
+    float root = (ior - 1.0) / (ior + 1.0);
+    return root * root;
+}
+
 // Schlick's approximation, as glTF 2.0, appendix B, has it for metals.
 vec3 fresnel_schlick(vec3 f0, float cos_i) {
-    float m = clamp(1.0 - cos_i, 0.0, 1.0);
-    float m2 = m * m;
-    return f0 + (1.0 - f0) * (m2 * m2 * m);
+    return f0 + (1.0 - f0) * schlick(cos_i);
 }
 
 // A ray's meeting with a surface, with both normals turned to the side that the ray comes from.
@@ -49,6 +53,12 @@ vec3 mirror_direction(Facing facing, vec3 incoming) {
     return normalize(reflected);
 }
 
+// A photon's flux is per area of the surface; the shading normal's cosine replaces the geometric one's: Veach, «Robust Monte
+// Carlo Methods for Light Transport Simulation», 1997, section 5.3.
+float landing_correction(Facing facing, vec3 incoming) {
+    return dot(incoming, facing.shading_normal) / dot(incoming, facing.geometric_normal);
+}
+
 // Where a glossy surface scatters a photon to that comes from v, instead of the cosine-distributed `outgoing` or as that says,
 // and the part of the flux that goes there. Chosen by u.w, drawn by u.xy.
 vec3 scatter(Reflector reflector, Facing facing, vec3 v, vec4 u, inout vec3 outgoing) {
@@ -59,7 +69,7 @@ vec3 scatter(Reflector reflector, Facing facing, vec3 v, vec4 u, inout vec3 outg
     if (reflector.alpha < SMOOTH_ALPHA) {
         if (reflects) {
             outgoing = mirror_direction(facing, -v);
-            return fresnel(reflector, nv) / p;
+            return fresnel(reflector, nv) * (coat_passes(reflector.coat, nv) / p);
         }
         return PI / (1.0 - p) * brdf(reflector, n, v, outgoing);
     }
@@ -71,35 +81,82 @@ vec3 scatter(Reflector reflector, Facing facing, vec3 v, vec4 u, inout vec3 outg
     return brdf(reflector, n, v, outgoing) * (cosine / max(density, 1e-20));
 }
 
+// What a ray meets of a coated surface is by chance the coat, which then is the material, or what lies below it. Returns the
+// factor of what the path carries; u is a uniform number. The inside of glass has no coat.
+float choose_layer(inout Material material, inout Facing facing, Surface surface, vec3 incoming, float u) {
+    bool coated = is_coated(material) && (facing.front || !is_dielectric(material) || is_thin(material));
+    if (!coated) {
+        return 1.0;
+    }
+    vec3 n = facing.front ? surface.coat_normal : -surface.coat_normal;
+    n = dot(incoming, n) < 0.0 ? n : facing.geometric_normal;
+    // At least a quarter, as of any reflection; at most most, for what a smooth coat doesn't reflect at a grazing angle, a
+    // rough one passes.
+    float p = clamp(1.0 - coat_passes(material.coat, -dot(incoming, n)), 0.25 * material.coat, 0.9);
+    if (u >= p) {
+        return 1.0 / (1.0 - p);
+    }
+    facing.shading_normal = n;
+    material.surface = GLOSSY_SURFACE;
+    material.base_color = vec3(0.0);
+    material.metallic = 0.0;
+    material.roughness = material.coat_roughness;
+    material.specular_f0 = vec3(COAT_F0 * material.coat);
+    material.specular_f90 = material.coat;
+    material.coat = 0.0;
+    return 1.0 / p;
+}
+
 // What can happen at a dielectric boundary.
 struct Boundary {
     float reflectance;
     float eta;       // index of the incident side over that of the other side
     vec3 reflected;  // directions
     vec3 refracted;
-    float reflected_weight; // what microfacets let through
-    float refracted_weight;
+    vec3 reflected_weight; // what microfacets and a coat let through
+    vec3 refracted_weight;
 };
+
+// Weighs what a boundary reflects and refracts with what extensions make of it. ior: index inside over that outside.
+void weigh(inout Boundary boundary, Facing facing, vec3 incoming, Material material, float ior) {
+    bool specular = SPECULAR_GLASS && boundary.reflectance < 1.0;
+    if (specular) {
+        // KHR_materials_specular changes the ends of Fresnel's curve, total reflection apart.
+        float f0 = normal_reflectance(ior);
+        vec3 changed = mix(material.specular_f0 * (f0 / max(normal_reflectance(material.ior), 1e-10)),
+                           vec3(material.specular_f90), (boundary.reflectance - f0) / (1.0 - f0));
+        boundary.reflected_weight *= changed / max(boundary.reflectance, 1e-10);
+        boundary.refracted_weight *= (1.0 - changed) / (1.0 - boundary.reflectance);
+    }
+    if (is_coated(material)) {
+        // It lies outside.
+        bool front = facing.front || is_thin(material);
+        float passes = coat_passes(material.coat, -dot(front ? incoming : boundary.refracted, facing.shading_normal));
+        boundary.reflected_weight *= front ? passes : 1.0;
+        boundary.refracted_weight *= passes;
+    }
+}
 
 // outside: index of refraction. u chooses the microfacet of a rough boundary. A thin wall is crossed without bending.
 Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float outside, vec2 u) {
     vec3 n = facing.shading_normal;
     float alpha = material.roughness * material.roughness;
     bool rough = ROUGH_GLASS && alpha >= SMOOTH_ALPHA;
+    Facing micro = facing;
     if (rough) {
-        facing.shading_normal = visible_normal(alpha, n, -incoming, u);
+        micro.shading_normal = visible_normal(alpha, n, -incoming, u);
     }
-    vec3 m = facing.shading_normal;
+    vec3 m = micro.shading_normal;
     float ior = material.ior / outside;
     Boundary boundary;
     boundary.eta = facing.front || is_thin(material) ? 1.0 / ior : ior;
     float cos_i = -dot(incoming, m);
     float cos_t;
     boundary.reflectance = fresnel_dielectric(cos_i, boundary.eta, cos_t);
-    boundary.reflected = mirror_direction(facing, incoming);
+    boundary.reflected = mirror_direction(micro, incoming);
     boundary.refracted = normalize(boundary.eta * incoming + (boundary.eta * cos_i - cos_t) * m);
-    boundary.reflected_weight = 1.0;
-    boundary.refracted_weight = 1.0;
+    boundary.reflected_weight = vec3(1.0);
+    boundary.refracted_weight = vec3(1.0);
     if (is_thin(material)) {
         // Microfacets on both sides: what is reflected, turned to the other side.
         vec3 mirrored = incoming + 2.0 * cos_i * m;
@@ -110,44 +167,9 @@ Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float ou
         float nv = -dot(incoming, n);
         float up = dot(incoming + 2.0 * cos_i * m, n);
         float down = -dot(boundary.refracted, n);
-        boundary.reflected_weight = up > 0.0 ? joint_masking(alpha, nv, up) : 0.0;
-        boundary.refracted_weight = down > 0.0 ? 2.0 * down / (down + masking_root(alpha, down)) : 0.0;
+        boundary.reflected_weight = vec3(up > 0.0 ? joint_masking(alpha, nv, up) : 0.0);
+        boundary.refracted_weight = vec3(down > 0.0 ? 2.0 * down / (down + masking_root(alpha, down)) : 0.0);
     }
+    weigh(boundary, facing, incoming, material, ior);
     return boundary;
-}
-
-// BSDF · cosine of a rough boundary between the viewer's side and a direction on either side; radiance's factor included.
-vec3 rough_boundary(Facing facing, Material material, float outside, vec3 tint, vec3 v, vec3 l) {
-    vec3 n = facing.shading_normal;
-    float alpha = material.roughness * material.roughness;
-    float ior = material.ior / outside;
-    float eta = facing.front || is_thin(material) ? 1.0 / ior : ior;
-    float nv = dot(n, v);
-    float nl = abs(dot(n, l));
-    float root_v = masking_root(alpha, nv);
-    float root_l = masking_root(alpha, nl);
-    float cos_t;
-    if (dot(n, l) > 0.0 || is_thin(material)) {
-        vec3 up = dot(n, l) > 0.0 ? l : l - 2.0 * dot(n, l) * n;
-        vec3 h = normalize(v + up);
-        float f = fresnel_dielectric(dot(v, h), eta, cos_t);
-        float d = ggx(alpha, n, h) * nl;
-        return dot(n, l) > 0.0 ? vec3(f * d * 0.5 / (nl * root_v + nv * root_l))
-                               : tint * ((1.0 - f) * d / ((nl + root_l) * (nv + root_v)));
-    }
-    // By the normal that refracts the one into the other: Walter and others, «Microfacet Models for Refraction through Rough
-    // Surfaces», Eurographics Symposium on Rendering, 2007.
-    vec3 across = eta * v + l;
-    float length2 = dot(across, across);
-    vec3 h = across * inversesqrt(max(length2, 1e-20));
-    h = dot(h, n) < 0.0 ? -h : h;
-    float cos_i = dot(v, h);
-    float f = fresnel_dielectric(cos_i, eta, cos_t);
-    bool possible = cos_i > 0.0 && dot(l, h) < 0.0 && f < 1.0 && length2 > 1e-12;
-    float density = ggx(alpha, n, h) * 2.0 * cos_i / (nv + root_v) * cos_t / length2;
-    return possible ? tint * (eta * eta * (1.0 - f) * density * 2.0 * nl / (nl + root_l)) : vec3(0.0);
-}
-
-float largest(vec3 v) {
-    return max(v.x, max(v.y, v.z));
 }

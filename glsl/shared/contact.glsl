@@ -19,7 +19,7 @@ const uint VACUUM = 0xffffffffu;
 // medium: the material that the ray is in, as far as its path knows. The other side's tint is that without its textures.
 Encounter encounter(Hit hit, vec3 incoming, uint medium) {
     Encounter met;
-    met.surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
+    met.surface = surface_at(hit);
     met.outside = 1.0;
     met.through = medium;
     met.beyond = medium;
@@ -34,12 +34,24 @@ Encounter encounter(Hit hit, vec3 incoming, uint medium) {
     if (touched) {
         vec3 n = met.surface.geometric_normal;
         float step_off = ROUNDINGS * dot(abs(n), met.surface.reach);
-        float probe = ROUNDINGS * (met.surface.reach.x + met.surface.reach.y + met.surface.reach.z);
-        Hit other_hit = trace(met.surface.position + probe * n, -2.0 * probe * n, 1.0, hit.triangle, false);
+        float size = met.surface.reach.x + met.surface.reach.y + met.surface.reach.z;
+        if (INSTANCED) {
+            size = max(size, 1.0); // of the scene: what lies there may be an instance, see below
+        }
+        float probe = ROUNDINGS * size;
+        Hit other_hit = trace(met.surface.position + probe * n, -2.0 * probe * n, 1.0, triangle_of(hit), false);
         if (other_hit.triangle != MISS) {
-            Surface other = surface_at(other_hit.triangle, vec2(other_hit.u, other_hit.v));
+            Surface other = surface_at(other_hit);
+            if (INSTANCED) {
+                // Where an instance puts its corners is uncertain by more than their own rounding.
+                other.reach = max(other.reach, met.surface.reach);
+                step_off = ROUNDINGS * dot(abs(n), other.reach);
+            }
             bool apart = abs(dot(other.position - met.surface.position, n)) > step_off;
             bool meets_other = !apart && other.object != met.surface.object;
+            if (INSTANCED) {
+                met.surface.reach = meets_other ? other.reach : met.surface.reach;
+            }
             Material other_material = material_at(other.material);
             bool is_there = share_there(other) >= 0.5;
             if (meets_other && !is_dielectric(other_material) && is_there) {

@@ -4,7 +4,7 @@ struct Emission {
     vec3 origin;
     vec3 direction;
     vec3 flux;
-    uint ignored;        // the triangle that it leaves, or MISS
+    PlacedTriangle ignored; // the triangle that it leaves
     float inverse_range; // of a punctual light
 };
 
@@ -34,7 +34,7 @@ float spot_versine(PunctualLight light, float u, out float solid_angle) {
 Emission emit_punctual(PunctualLight light, uint kind, float area, vec2 place, vec2 direction) {
     if (kind == DIRECTIONAL_LIGHT) {
         return Emission(origin_afar(light.position, light.direction, area, place), light.direction,
-                        light.intensity * area, MISS, 0.0);
+                        light.intensity * area, NO_TRIANGLE, 0.0);
     }
     float solid_angle = 4.0 * PI;
     float versine = 2.0 * direction.x;
@@ -43,7 +43,8 @@ Emission emit_punctual(PunctualLight light, uint kind, float area, vec2 place, v
         versine = spot_versine(light, direction.x, solid_angle);
         axis = light.direction;
     }
-    return Emission(light.position, direction_off(axis, versine, direction.y), light.intensity * solid_angle, MISS,
+    return Emission(light.position, direction_off(axis, versine, direction.y), light.intensity * solid_angle,
+                    NO_TRIANGLE,
                     light.inverse_range);
 }
 
@@ -51,7 +52,7 @@ Emission emit_environment(float area, vec2 place, vec2 direction) {
     vec3 towards;
     Sky sky = sample_environment(direction, towards);
     return Emission(origin_afar(towards * sqrt(area / PI), -towards, area, place), -towards,
-                    sky.radiance * (area / sky.density), MISS, 0.0);
+                    sky.radiance * (area / sky.density), NO_TRIANGLE, 0.0);
 }
 
 Emission emit(inout Random random) {
@@ -67,15 +68,20 @@ Emission emit(inout Random random) {
     } else if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
         emission = emit_environment(light.area, place, u.zw);
     } else {
-        Surface emitter = surface_at(light.triangle, triangle_point(place));
+        PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
+        Surface emitter = surface_at(triangle, triangle_point(place));
         Material material = material_of(emitter);
         vec3 normal = emitter.geometric_normal;
-        if (material.double_sided != 0u && w.y < 0.5) {
+        bool both_sides = emits(material, false);
+        if (both_sides && w.y < 0.5) {
             normal = -normal;
         }
-        float sides = material.double_sided != 0u ? 2.0 : 1.0;
-        emission = Emission(offset_origin(emitter.position, normal, emitter.reach), cosine_direction(normal, u.zw),
-                            material.emission * (PI * sides * light.area * share_there(emitter)), light.triangle, 0.0);
+        float sides = both_sides ? 2.0 : 1.0;
+        vec3 direction = cosine_direction(normal, u.zw);
+        emission = Emission(offset_origin(emitter.position, normal, emitter.reach), direction,
+                            emitted_radiance(material, dot(direction, normal)) *
+                                (PI * sides * light.area * share_there(emitter)),
+                            triangle, 0.0);
     }
     emission.flux /= light.probability;
     return emission;

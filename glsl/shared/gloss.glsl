@@ -9,68 +9,61 @@ const float SMOOTH_ALPHA = 1e-3;
 // Below this α camera paths follow reflections; photons gathered on such a narrow lobe would be noise.
 const float FOLLOWED_ALPHA = 0.1;
 
-// In which a byte has a part from 0 to 1: a half is one of them.
-const float PART_STEPS = 254.0;
-
 struct Reflector {
-    vec3 diffuse;    // albedo of the base
-    vec3 f0;         // reflectance of the boundary at normal and at grazing incidence
+    vec3 diffuse;   // albedo of the base
+    vec3 f0;        // reflectance of the boundary at normal and at grazing incidence
     float f90;
     float alpha;
-    float metallic;  // part that is metal and has no base
-    vec2 over_base;  // largest channel of what reflects over the base, at normal and at grazing incidence
+    vec2 over_base; // largest channel of what reflects over the base, at normal and at grazing incidence
+    float coat;     // what lies above both, see KHR_materials_clearcoat: how much of a dielectric's reflection it has
 };
 
-const Reflector NO_REFLECTOR = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, vec2(0.0));
-
-float largest_channel(vec3 v) {
-    return max(v.x, max(v.y, v.z));
-}
-
-// specular: reflectance at grazing incidence of the part that isn't metal.
-Reflector make_reflector(vec3 diffuse, vec3 f0, float specular, float metallic, float alpha) {
-    // f0 is a mixture of the metal's colour, of which `diffuse` is what isn't metal, and of what is wanted.
-    float rest = max(1.0 - metallic, 1e-3);
-    float over_base = max(largest_channel(f0 - diffuse * (metallic / rest)) / rest, 0.0);
-    return Reflector(diffuse, f0, mix(specular, 1.0, metallic), alpha, metallic, vec2(over_base, specular));
-}
+const Reflector NO_REFLECTOR = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0, vec2(0.0), 0.0);
 
 // How a visible point's surface scatters.
 struct Gloss {
     vec4 diffuse_viewer; // w: uint bits, octahedral v
-    // w: uint bits. Lower half an f16, α, 0 where the path followed the reflection itself; then two bytes, of PART_STEPS:
-    // `metallic` and `specular` of make_reflector.
-    vec4 f0_rest;
+    uvec4 rest;          // f16s: f0, f90, α, coat, over_base; α = 0 where the path followed the reflection itself
 };
 
-#define GLOSS(i) Gloss(TEXEL(GlossOf, 2u * (i)), TEXEL(GlossOf, 2u * (i) + 1u))
+#define GLOSS(i) Gloss(TEXEL(GlossOf, 2u * (i)), TEXEL_BITS(GlossOf, 2u * (i) + 1u))
 
 Reflector reflector_of(Gloss gloss) {
-    uint rest = floatBitsToUint(gloss.f0_rest.w);
-    vec2 parts = vec2(rest >> 16u & 0xffu, rest >> 24u) * (1.0 / PART_STEPS);
-    return make_reflector(gloss.diffuse_viewer.rgb, gloss.f0_rest.rgb, parts.y, parts.x, unpackHalf2x16(rest).x);
+    vec2 f0_b_f90 = unpackHalf2x16(gloss.rest.y);
+    vec2 alpha_coat = unpackHalf2x16(gloss.rest.z);
+    return Reflector(gloss.diffuse_viewer.rgb, vec3(unpackHalf2x16(gloss.rest.x), f0_b_f90.x), f0_b_f90.y, alpha_coat.x,
+                     unpackHalf2x16(gloss.rest.w), alpha_coat.y);
 }
 
 Gloss gloss_of(Reflector reflector, vec3 v) {
-    uvec2 parts = uvec2(vec2(reflector.metallic, reflector.over_base.y) * PART_STEPS + 0.5);
-    uint rest = packHalf2x16(vec2(reflector.alpha, 0.0)) | parts.x << 16u | parts.y << 24u;
     return Gloss(vec4(reflector.diffuse, uintBitsToFloat(encode_direction(v))),
-                 vec4(reflector.f0, uintBitsToFloat(rest)));
+                 uvec4(packHalf2x16(reflector.f0.rg), packHalf2x16(vec2(reflector.f0.b, reflector.f90)),
+                       packHalf2x16(vec2(reflector.alpha, reflector.coat)), packHalf2x16(reflector.over_base)));
 }
 
-float schlick_weight(float cosine) {
+// The fifth power of 1 − cosine.
+float schlick(float cosine) {
     float m = clamp(1.0 - cosine, 0.0, 1.0);
     float m2 = m * m;
     return m2 * m2 * m;
 }
 
 vec3 fresnel(Reflector reflector, float cosine) {
-    return reflector.f0 + (reflector.f90 - reflector.f0) * schlick_weight(cosine);
+    return reflector.f0 + (reflector.f90 - reflector.f0) * schlick(cosine);
 }
 
 // What gets through to the base, alike for all colours (KHR_materials_specular), and past what isn't metal alone.
 float through_to_base(Reflector reflector, float cosine) {
-    return 1.0 - mix(reflector.over_base.x, reflector.over_base.y, schlick_weight(cosine));
+    return 1.0 - mix(reflector.over_base.x, reflector.over_base.y, schlick(cosine));
+}
+
+// Reflectance of a clear coat, whose index of refraction is 1.5.
+const float COAT_F0 = 0.04;
+
+// What a coat lets through to what lies below. KHR_materials_clearcoat takes the cosine to the viewer; that to the
+// microfacet's normal is the same where the coat is smooth, and both ways of the light are one.
+float coat_passes(float coat, float cosine) {
+    return 1.0 - coat * mix(COAT_F0, 1.0, schlick(cosine));
 }
 
 // Density of microfacet normals. The sine comes from the cross product: 1 − cos² of a small angle is rounding.
@@ -105,7 +98,8 @@ vec3 brdf(Reflector reflector, vec3 n, vec3 v, vec3 l) {
     float alpha = max(reflector.alpha, SMOOTH_ALPHA);
     float visibility = 0.5 / (nl * masking_root(alpha, nv) + nv * masking_root(alpha, nl));
     float lobe = reflector.alpha < SMOOTH_ALPHA ? 0.0 : ggx(alpha, n, h) * visibility;
-    return nv > 0.0 && nl > 0.0 ? through * reflector.diffuse * (1.0 / PI) + f * lobe : vec3(0.0);
+    vec3 value = through * reflector.diffuse * (1.0 / PI) + f * lobe;
+    return nv > 0.0 && nl > 0.0 ? coat_passes(reflector.coat, cosine) * value : vec3(0.0);
 }
 
 // Share of the samples that go to the boundary's reflection: at least a quarter, for what it mirrors may be bright.
@@ -144,8 +138,8 @@ float reflected_density(float alpha, vec3 n, vec3 v, vec3 l) {
 vec3 reflected_weight(Reflector reflector, vec3 n, vec3 v, vec3 l) {
     float nv = dot(n, v);
     float nl = dot(n, l);
-    if (reflector.alpha < SMOOTH_ALPHA) {
-        return fresnel(reflector, nv);
-    }
-    return nl > 0.0 ? fresnel(reflector, dot(v, normalize(v + l))) * joint_masking(reflector.alpha, nv, nl) : vec3(0.0);
+    bool smooth_boundary = reflector.alpha < SMOOTH_ALPHA;
+    float vh = smooth_boundary ? nv : dot(v, normalize(v + l));
+    float masking = smooth_boundary ? 1.0 : (nl > 0.0 ? joint_masking(reflector.alpha, nv, nl) : 0.0);
+    return fresnel(reflector, vh) * (coat_passes(reflector.coat, vh) * masking);
 }

@@ -59,7 +59,8 @@ float side_of(vec2 a, vec2 b) {
 // Woop, Benthin and Wald, «Watertight Ray/Triangle Intersection», JCGT 2(1), 2013: no ray passes between triangles that
 // share an edge or a corner. The distance is that of the plane: unlike one interpolated from the corners', it is as right
 // for a ray that starts on the triangle as `offset_origin` counts on. Accepts 0 < t < hit.t.
-bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, uint index, inout Hit hit) {
+bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, PlacedTriangle at,
+                          inout Hit hit) {
     vec2 a = beside(ray, corner0);
     vec2 b = beside(ray, corner1);
     vec2 c = beside(ray, corner2);
@@ -75,40 +76,83 @@ bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, uin
         return false;
     }
     float inverse = 1.0 / sum;
-    hit = Hit(t, sides.y * inverse, sides.z * inverse, index);
+    hit = Hit(t, sides.y * inverse, sides.z * inverse, at.triangle, at.instance);
     return true;
 }
 
 // Havel and Herout, «Yet faster ray-triangle intersection (using SSE4)», 2010: the test with precomputed planes.
-// Accepts 0 < t < hit.t.
-bool intersect_havel(Ray ray, uint index, inout Hit hit) {
-    HavelTriangle triangle = havel_triangle(index);
-    float det = dot(ray.direction, triangle.n0.xyz);
-    float det_t = triangle.n0.w - dot(ray.origin, triangle.n0.xyz);
+// The ray is that of the triangle's own space. Accepts 0 < t < hit.t.
+bool intersect_havel(vec3 origin, vec3 direction, PlacedTriangle at, inout Hit hit) {
+    HavelTriangle triangle = havel_triangle(at.triangle);
+    float det = dot(direction, triangle.n0.xyz);
+    float det_t = triangle.n0.w - dot(origin, triangle.n0.xyz);
     float inverse = 1.0 / det;
     float t = det_t * inverse;
     if (!(t > 0.0 && t < hit.t)) {
         return false;
     }
-    vec3 point = ray.origin + t * ray.direction;
+    vec3 point = origin + t * direction;
     float u = dot(point, triangle.n1.xyz) + triangle.n1.w;
     float v = dot(point, triangle.n2.xyz) + triangle.n2.w;
     if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0)) {
         return false;
     }
-    hit = Hit(t, u, v, index);
+    hit = Hit(t, u, v, at.triangle, at.instance);
     return true;
 }
 
-bool intersect_triangle(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, uint index, inout Hit hit) {
-    return HAVEL ? intersect_havel(ray, index, hit)
-                 : intersect_watertight(ray, corner0, corner1, corner2, index, hit);
+// A ray as the boxes of a hierarchy see it, in the space of its triangles. Where that isn't render space, the ray is rounded,
+// and so are the triangles' places: `low` and `high` are the origin and what the boxes are widened by, both ways.
+struct LocalRay {
+    vec3 origin;
+    vec3 direction;
+    vec3 low;
+    vec3 high;
+    vec3 inverse_direction;
+};
+
+// A component of 0 gives infinite slabs; ±1e-20 keeps 0 · ∞ out of them.
+vec3 inverse_of(vec3 direction) {
+    vec3 safe = vec3(abs(direction.x) < 1e-20 ? 1e-20 : direction.x, abs(direction.y) < 1e-20 ? 1e-20 : direction.y,
+                     abs(direction.z) < 1e-20 ? 1e-20 : direction.z);
+    return 1.0 / safe;
+}
+
+LocalRay in_render_space(Ray ray) {
+    return LocalRay(ray.origin, ray.direction, ray.origin, ray.origin, inverse_of(ray.direction));
+}
+
+// A few roundings of 2^-24: of a row's factors, its products, their sum and that with what the boxes are widened by.
+const float ROW_ROUNDINGS = 8.0 / 16777216.0;
+
+// The ray in the space of an instance's triangles, given the rows of the map there and what roundings of the triangles' places
+// come to there. t stays the same.
+LocalRay in_instance(Ray ray, mat3x4 rows, float widening) {
+    vec3 d = vec3(dot(rows[0].xyz, ray.direction), dot(rows[1].xyz, ray.direction), dot(rows[2].xyz, ray.direction));
+    vec3 o = vec3(dot(rows[0].xyz, ray.origin), dot(rows[1].xyz, ray.origin), dot(rows[2].xyz, ray.origin)) +
+             vec3(rows[0].w, rows[1].w, rows[2].w);
+    // The sizes of the terms bound the rounding. The ray has left the triangles, which lie within ±1, at t = `last`.
+    vec3 of_d = vec3(dot(abs(rows[0].xyz), abs(ray.direction)), dot(abs(rows[1].xyz), abs(ray.direction)),
+                     dot(abs(rows[2].xyz), abs(ray.direction)));
+    vec3 of_o = vec3(dot(abs(rows[0]), vec4(abs(ray.origin), 1.0)), dot(abs(rows[1]), vec4(abs(ray.origin), 1.0)),
+                     dot(abs(rows[2]), vec4(abs(ray.origin), 1.0)));
+    vec3 size = abs(d);
+    vec3 distance = abs(o);
+    float last = (max(max(distance.x, distance.y), distance.z) + 2.0) / max(max(size.x, size.y), size.z);
+    vec3 wider = vec3(widening) + ROW_ROUNDINGS * (of_o + last * of_d);
+    return LocalRay(o, d, o + wider, o - wider, inverse_of(d));
+}
+
+bool intersect_triangle(Ray ray, LocalRay local, vec3 corner0, vec3 corner1, vec3 corner2, PlacedTriangle at,
+                        inout Hit hit) {
+    return HAVEL ? intersect_havel(local.origin, local.direction, at, hit)
+                 : intersect_watertight(ray, corner0, corner1, corner2, at, hit);
 }
 
 // Entry distance of the ray into a box, or a value above `limit` where it misses.
-float enter_box(vec3 box_min, vec3 box_max, vec3 origin, vec3 inverse_direction, float limit) {
-    vec3 t0 = (box_min - origin) * inverse_direction;
-    vec3 t1 = (box_max - origin) * inverse_direction;
+float enter_box(vec3 box_min, vec3 box_max, LocalRay ray, float limit) {
+    vec3 t0 = (box_min - ray.low) * ray.inverse_direction;
+    vec3 t1 = (box_max - ray.high) * ray.inverse_direction;
     vec3 near = min(t0, t1);
     vec3 far = max(t0, t1);
     float enter = max(max(near.x, near.y), max(near.z, 0.0));
@@ -118,29 +162,75 @@ float enter_box(vec3 box_min, vec3 box_max, vec3 origin, vec3 inverse_direction,
 }
 
 const uint STACK_SIZE = 64u;
-const uint LEAF = 0x80000000u; // of a reference to a triangle, see layout::BvhRecord
+const uint LEAF = 0x80000000u; // of a reference to a leaf's first record, see layout::BvhRecord
+const uint PLACEMENT_RECORD = 1u; // kinds of a leaf's records, triangles' but not
+const uint RAY_RECORD = 2u;
+
+// Rows of the map back.
+mat3x4 inverse_rows(mat3x4 rows) {
+    mat3 inverse = inverse(mat3(rows[0].xyz, rows[1].xyz, rows[2].xyz));
+    vec3 from = vec3(rows[0].w, rows[1].w, rows[2].w);
+    return mat3x4(vec4(inverse[0], -dot(inverse[0], from)), vec4(inverse[1], -dot(inverse[1], from)),
+                  vec4(inverse[2], -dot(inverse[2], from)));
+}
+
+const mat3x4 UNPLACED = mat3x4(1.0);
+
+// Every triangle, as `trace`: those in render space, then those of each instance.
+Hit trace_all(Ray ray, float limit, PlacedTriangle ignored, bool any_hit) {
+    Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
+    LocalRay local = in_render_space(ray);
+    mat3x4 rows = UNPLACED;
+    PlacedTriangle at = PlacedTriangle(0u, NO_INSTANCE);
+    uint left = settings.triangle_count;
+    uint next = 0u;
+    bool complete = false;
+    bool over = false;
+    while (!complete && !over && loops_left()) {
+        loop_count += 1u;
+        bool tests = left > 0u;
+        if (tests) {
+            ShadingTriangle triangle = shading_triangle(at.triangle);
+            vec3 corner0 = triangle.p0.xyz;
+            vec3 corner1 = triangle.p1.xyz;
+            vec3 corner2 = triangle.p2.xyz;
+            if (INSTANCED) {
+                corner0 = placed(rows, corner0);
+                corner1 = placed(rows, corner1);
+                corner2 = placed(rows, corner2);
+            }
+            over = at != ignored && intersect_triangle(ray, local, corner0, corner1, corner2, at, hit) && any_hit;
+            at.triangle += 1u;
+            left -= 1u;
+        }
+        bool enters = INSTANCED && !tests && next < settings.instance_count;
+        if (enters) {
+            Instance instance = instance_at(next);
+            rows = instance.rows;
+            at = PlacedTriangle(instance.first_triangle, next);
+            left = instance.triangle_count;
+            next += 1u;
+            if (HAVEL) {
+                local = in_instance(ray, inverse_rows(rows), 0.0);
+            }
+        }
+        complete = !tests && !enters;
+    }
+    loops_cut = loops_cut || !(complete || over);
+    return hit;
+}
 
 // The nearest triangle but `ignored` before t = limit. With any_hit: some triangle before it.
-Hit trace(vec3 origin, vec3 direction, float limit, uint ignored, bool any_hit) {
+Hit trace(vec3 origin, vec3 direction, float limit, PlacedTriangle ignored, bool any_hit) {
     Ray ray = ray_frame(origin, direction);
-    Hit hit = Hit(limit, 0.0, 0.0, MISS);
     if (BRUTE_FORCE) {
-        uint i = 0u;
-        bool over = false;
-        while (i < settings.triangle_count && !over && loops_left()) {
-            loop_count += 1u;
-            ShadingTriangle triangle = shading_triangle(i);
-            over = i != ignored &&
-                   intersect_triangle(ray, triangle.p0.xyz, triangle.p1.xyz, triangle.p2.xyz, i, hit) && any_hit;
-            i += 1u;
-        }
-        loops_cut = loops_cut || (i < settings.triangle_count && !over);
-        return hit;
+        return trace_all(ray, limit, ignored, any_hit);
     }
-    // A component of 0 gives infinite slabs; ±1e-20 keeps 0 · ∞ out of them.
-    vec3 safe = vec3(abs(direction.x) < 1e-20 ? 1e-20 : direction.x, abs(direction.y) < 1e-20 ? 1e-20 : direction.y,
-                     abs(direction.z) < 1e-20 ? 1e-20 : direction.z);
-    vec3 inverse_direction = 1.0 / safe;
+    Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
+    LocalRay local = in_render_space(ray);
+    mat3x4 rows = UNPLACED; // of the instance that the lane is in
+    uint instance = NO_INSTANCE;
+    uint outside = STACK_SIZE; // the depth of the stack at which it leaves that
     uint stack[STACK_SIZE];
     uint depth = 0u;
     uint limit_of_loops = settings.loop_limit; // kept at hand: some drivers load it anew in each step
@@ -160,14 +250,36 @@ Hit trace(vec3 origin, vec3 direction, float limit, uint ignored, bool any_hit) 
         bool pop;
         if (is_leaf) {
             uint index = floatBitsToUint(row3.x);
-            if (index != ignored && intersect_triangle(ray, row0.xyz, row1.xyz, row2.xyz, index, hit) && any_hit) {
+            vec3 corner0 = row0.xyz;
+            vec3 corner1 = row1.xyz;
+            vec3 corner2 = row2.xyz;
+            bool tests = index != ignored.triangle;
+            if (INSTANCED) {
+                corner0 = placed(rows, corner0);
+                corner1 = placed(rows, corner1);
+                corner2 = placed(rows, corner2);
+                tests = floatBitsToUint(row3.z) == 0u && (tests || instance != ignored.instance);
+            }
+            PlacedTriangle at = PlacedTriangle(index, instance);
+            if (tests && intersect_triangle(ray, local, corner0, corner1, corner2, at, hit) && any_hit) {
                 return hit;
             }
             pop = floatBitsToUint(row3.y) == 1u;
             reference += 1u;
+            if (INSTANCED) {
+                uint kind = floatBitsToUint(row3.z);
+                if (kind == PLACEMENT_RECORD) {
+                    rows = mat3x4(row0, row1, row2);
+                    instance = index;
+                } else if (kind == RAY_RECORD) {
+                    local = in_instance(ray, mat3x4(row0, row1, row2), row3.w);
+                    reference = index;
+                    outside = depth;
+                }
+            }
         } else {
-            float enter_left = enter_box(row0.xyz, row1.xyz, origin, inverse_direction, hit.t);
-            float enter_right = enter_box(row2.xyz, row3.xyz, origin, inverse_direction, hit.t);
+            float enter_left = enter_box(row0.xyz, row1.xyz, local, hit.t);
+            float enter_right = enter_box(row2.xyz, row3.xyz, local, hit.t);
             uint left = floatBitsToUint(row0.w);
             uint right = floatBitsToUint(row2.w);
             bool left_first = enter_left <= enter_right;
@@ -180,6 +292,14 @@ Hit trace(vec3 origin, vec3 direction, float limit, uint ignored, bool any_hit) 
         stack[depth] = far_child;
         depth += push ? 1u : 0u;
         if (pop) {
+            if (INSTANCED) {
+                if (depth == outside) {
+                    local = in_render_space(ray);
+                    rows = UNPLACED;
+                    instance = NO_INSTANCE;
+                    outside = STACK_SIZE;
+                }
+            }
             complete = depth == 0u;
             depth = max(depth, 1u) - 1u;
             reference = stack[depth];

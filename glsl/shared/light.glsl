@@ -73,7 +73,16 @@ Choice choose_light(float u, vec2 digits) {
 
 // Whether light leaves on the triangle's front, or on its back.
 bool emits(Material material, bool front) {
-    return front || material.double_sided != 0u;
+    return front || (material.sides & BACK_EMITS) != 0u;
+}
+
+// Radiance at this cosine to the normal: a coat lies on lamps too.
+vec3 emitted_radiance(Material material, float cosine) {
+    float passed = 1.0;
+    if (CLEARCOAT) {
+        passed = coat_passes(material.coat, cosine);
+    }
+    return passed * material.emission;
 }
 
 // How much of its intensity a spot has at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as

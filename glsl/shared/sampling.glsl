@@ -50,3 +50,7 @@ vec3 decode_octahedral(uint code) {
 vec3 decode_direction(uint code) {
     return normalize(decode_octahedral(code));
 }
+
+float largest(vec3 v) {
+    return max(v.x, max(v.y, v.z));
+}

@@ -13,14 +13,23 @@ layout(constant_id = 15) const bool ENVIRONMENT = false;
 layout(constant_id = 16) const bool TEXTURED = false;
 layout(constant_id = 17) const bool ALPHA = false;
 layout(constant_id = 18) const bool DISPERSION = false;
+layout(constant_id = 20) const bool INSTANCED = false;
+layout(constant_id = 21) const bool CLEARCOAT = false;
+layout(constant_id = 22) const bool SPECULAR_GLASS = false;
+layout(constant_id = 23) const bool CULLING = false;
 
 const uint MISS = 0xffffffffu;
 
 const uint NO_LIGHT = 0xffffffffu;
 
+const uint NO_INSTANCE = 0xffffffffu;
+
 // Flags of a triangle.
 const uint SMOOTH_SHADED = 1u; // the shading normals differ from the geometric one
 const uint TOUCHED = 2u;       // a dielectric's, and it may lie on a face of another object
+
+const uint BACK_EMITS = 1u;
+const uint BACK_HIDDEN = 2u;
 
 const uint MIRROR = 1u;
 const uint DIELECTRIC = 2u;
@@ -44,12 +53,29 @@ struct ShadingTriangle {
     uint light; // NO_LIGHT where it doesn't emit
 };
 
+// Where shared triangles are put.
+struct Instance {
+    mat3x4 rows;         // of the map to render space
+    uint object;
+    uint mirrored;       // 1 where fronts become backs
+    uint first_triangle;
+    uint triangle_count;
+};
+
+// A triangle, and the instance that puts it where it is.
+struct PlacedTriangle {
+    uint triangle; // MISS for none
+    uint instance; // NO_INSTANCE of one in render space
+};
+
+const PlacedTriangle NO_TRIANGLE = PlacedTriangle(MISS, NO_INSTANCE);
+
 struct Material {
     vec3 base_color;
     uint surface;      // MIRROR, DIELECTRIC, GLOSSY_SURFACE or 0 for matte
     vec3 emission;     // radiance
     float ior;
-    uint double_sided; // emits on both sides
+    uint sides;        // BACK_EMITS, BACK_HIDDEN
     float metallic;
     float roughness;
     float transmission; // share of a dielectric's part that is no metal that passes light; the rest is glossy
@@ -70,13 +96,23 @@ struct Material {
     float alpha_cutoff;
     float alpha;
     float dispersion; // 20 over the Abbe number
+    float coat;       // how much of it there is
+    float coat_roughness;
+    // As the textures above.
+    uint coat_texture;
+    uint coat_roughness_texture;
+    uint coat_normal_texture;
+    float coat_normal_scale;
+    uint padding0;
+    uint padding1;
 };
 
-const uint MATERIAL_TEXELS = 8u;
+const uint MATERIAL_TEXELS = 10u;
 
 uniform usamplerBuffer Bvh;
 uniform usamplerBuffer HavelTriangles;
 uniform usamplerBuffer ShadingTriangles;
+uniform usamplerBuffer Instances;
 uniform usamplerBuffer Materials;
 
 HavelTriangle havel_triangle(uint i) {
@@ -90,6 +126,24 @@ ShadingTriangle shading_triangle(uint i) {
                            TEXEL(ShadingTriangles, 4u * i + 2u), rest.x, rest.y, rest.z, rest.w);
 }
 
+Instance instance_at(uint i) {
+    uvec4 rest = TEXEL_BITS(Instances, 4u * i + 3u);
+    return Instance(mat3x4(TEXEL(Instances, 4u * i), TEXEL(Instances, 4u * i + 1u), TEXEL(Instances, 4u * i + 2u)), rest.x,
+                    rest.y, rest.z, rest.w);
+}
+
+// Where a map puts a point: the same for all triangles that share a corner, and `Placement::point` in src/scene.
+vec3 placed(mat3x4 rows, vec3 p) {
+    precise vec3 result = vec3(rows[0].x * p.x + rows[0].y * p.y + rows[0].z * p.z + rows[0].w,
+                               rows[1].x * p.x + rows[1].y * p.y + rows[1].z * p.z + rows[1].w,
+                               rows[2].x * p.x + rows[2].y * p.y + rows[2].z * p.z + rows[2].w);
+    return result;
+}
+
+bool is_placed(uint instance) {
+    return INSTANCED && instance != NO_INSTANCE;
+}
+
 Material material_at(uint i) {
     vec4 color = TEXEL(Materials, MATERIAL_TEXELS * i);
     vec4 emission = TEXEL(Materials, MATERIAL_TEXELS * i + 1u);
@@ -99,6 +153,9 @@ Material material_at(uint i) {
     if (GLOSSY) {
         specular = TEXEL(Materials, MATERIAL_TEXELS * i + 3u);
     }
+    if (SPECULAR_GLASS) {
+        specular = TEXEL(Materials, MATERIAL_TEXELS * i + 3u);
+    }
     if (DIELECTRICS) {
         inside = TEXEL_BITS(Materials, MATERIAL_TEXELS * i + 4u);
     }
@@ -106,9 +163,14 @@ Material material_at(uint i) {
     if (DISPERSION) {
         dispersion = TEXEL(Materials, MATERIAL_TEXELS * i + 7u).w;
     }
+    vec2 coat = vec2(0.0);
+    if (CLEARCOAT) {
+        coat = TEXEL(Materials, MATERIAL_TEXELS * i + 8u).xy;
+    }
     return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, uintBitsToFloat(rest.y),
                     uintBitsToFloat(rest.z), uintBitsToFloat(rest.w), specular.rgb, specular.w,
-                    uintBitsToFloat(inside.xyz), inside.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0u, 0.0, 0.0, dispersion);
+                    uintBitsToFloat(inside.xyz), inside.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0u, 0.0, 0.0, dispersion,
+                    coat.x, coat.y, 0u, 0u, 0u, 0.0, 0u, 0u);
 }
 
 bool is_mirror(Material material) {
@@ -142,6 +204,10 @@ bool choose_part(inout Material material, inout float u) {
     return mixed;
 }
 
+bool is_coated(Material material) {
+    return CLEARCOAT && material.coat > 0.0;
+}
+
 bool is_glossy(Material material) {
     return GLOSSY && material.surface == GLOSSY_SURFACE;
 }
@@ -151,9 +217,10 @@ bool is_matte(Material material) {
 }
 
 Reflector reflector_of(Material material) {
-    return make_reflector(material.base_color * (1.0 - material.metallic),
-                          mix(material.specular_f0, material.base_color, material.metallic), material.specular_f90,
-                          material.metallic, material.roughness * material.roughness);
+    return Reflector(material.base_color * (1.0 - material.metallic),
+                     mix(material.specular_f0, material.base_color, material.metallic),
+                     mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness,
+                     vec2(largest(material.specular_f0), material.specular_f90), material.coat);
 }
 
 struct Hit {
@@ -161,51 +228,99 @@ struct Hit {
     float u;
     float v;
     uint triangle; // MISS where nothing was hit
+    uint instance; // NO_INSTANCE where the triangle is in render space
 };
+
+PlacedTriangle triangle_of(Hit hit) {
+    return PlacedTriangle(hit.triangle, hit.instance);
+}
 
 // Where a ray met a surface.
 struct Surface {
     vec3 position;
-    vec3 reach;            // largest coordinates of the triangle's corners, without their signs
+    vec3 reach;            // largest coordinates of the triangle's corners, or what those are sums of, without their signs
     vec3 geometric_normal; // of the triangle's front
     vec3 shading_normal;   // on the same side
+    vec3 coat_normal;      // likewise, of a clear coat
     vec2 uv;               // barycentric coordinates of the second and the third corner
-    uint triangle;
+    PlacedTriangle triangle;
     uint object;
     uint material;
     uint light;
     uint flags;
 };
 
-vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_normal) {
+// The matrix that takes normals along, up to their length: its rows, as columns.
+mat3 normal_rows(Instance instance) {
+    vec3 x = instance.rows[0].xyz;
+    vec3 y = instance.rows[1].xyz;
+    vec3 z = instance.rows[2].xyz;
+    // The products of small numbers shall not vanish.
+    vec3 largest = max(max(abs(x), abs(y)), abs(z));
+    float scale = 1.0 / max(max(largest.x, largest.y), largest.z);
+    x *= scale;
+    y *= scale;
+    z *= scale;
+    float side = instance.mirrored != 0u ? -1.0 : 1.0;
+    return side * mat3(cross(y, z), cross(z, x), cross(x, y));
+}
+
+vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_normal, bool is_placed, mat3 rows) {
     if ((triangle.flags & SMOOTH_SHADED) == 0u) {
         return geometric_normal;
     }
     vec3 n0 = decode_direction(floatBitsToUint(triangle.p0.w));
     vec3 n1 = decode_direction(floatBitsToUint(triangle.p1.w));
     vec3 n2 = decode_direction(floatBitsToUint(triangle.p2.w));
+    if (is_placed) {
+        n0 = normalize(n0 * rows);
+        n1 = normalize(n1 * rows);
+        n2 = normalize(n2 * rows);
+    }
     vec3 n = (1.0 - uv.x - uv.y) * n0 + uv.x * n1 + uv.y * n2;
     float length2 = dot(n, n);
     return length2 > 1e-12 && dot(n, geometric_normal) > 0.0 ? n * inversesqrt(length2) : geometric_normal;
 }
 
 // The point is rebuilt from the barycentric coordinates: unlike origin + t·direction its error doesn't grow with t.
-Surface surface_at(uint index, vec2 uv) {
-    ShadingTriangle triangle = shading_triangle(index);
+Surface surface_at(PlacedTriangle at, vec2 uv) {
+    ShadingTriangle triangle = shading_triangle(at.triangle);
+    bool is_placed = is_placed(at.instance);
+    Instance instance;
+    mat3 rows = mat3(1.0);
+    if (is_placed) {
+        instance = instance_at(at.instance);
+        rows = normal_rows(instance);
+        triangle.p0.xyz = placed(instance.rows, triangle.p0.xyz);
+        triangle.p1.xyz = placed(instance.rows, triangle.p1.xyz);
+        triangle.p2.xyz = placed(instance.rows, triangle.p2.xyz);
+        triangle.object = instance.object;
+    }
     vec3 e1 = triangle.p1.xyz - triangle.p0.xyz;
     vec3 e2 = triangle.p2.xyz - triangle.p0.xyz;
     Surface surface;
     surface.position = triangle.p0.xyz + uv.x * e1 + uv.y * e2;
     surface.reach = max(max(abs(triangle.p0.xyz), abs(triangle.p1.xyz)), abs(triangle.p2.xyz));
     surface.geometric_normal = normalize(cross(e1, e2));
-    surface.shading_normal = interpolated_normal(triangle, uv, surface.geometric_normal);
+    if (is_placed) {
+        // So much the corners are uncertain by against those of other objects in the same place.
+        surface.reach = vec3(dot(abs(instance.rows[0]), vec4(1.0)), dot(abs(instance.rows[1]), vec4(1.0)),
+                             dot(abs(instance.rows[2]), vec4(1.0)));
+        surface.geometric_normal *= instance.mirrored != 0u ? -1.0 : 1.0;
+    }
+    surface.shading_normal = interpolated_normal(triangle, uv, surface.geometric_normal, is_placed, rows);
+    surface.coat_normal = surface.shading_normal;
     surface.uv = uv;
-    surface.triangle = index;
+    surface.triangle = at;
     surface.object = triangle.object;
     surface.material = triangle.material;
     surface.light = triangle.light;
     surface.flags = triangle.flags;
     return surface;
+}
+
+Surface surface_at(Hit hit) {
+    return surface_at(triangle_of(hit), vec2(hit.u, hit.v));
 }
 
 // Moves a ray's origin off its surface, to the side of n, by a bound of the rounding errors of the position and of the

@@ -8,9 +8,9 @@ layout(std140) uniform Settings {
     uint slots_per_pixel;       // visible points a pixel
     uint seed;
     uint light_count;           // lights
-    uint padding;
+    uint instance_count;
     uint max_depth;             // bounces of a path at the most
-    uint triangle_count;
+    uint triangle_count;        // that instances don't share: the first ones
     uint photon_lanes;          // invocations among which an iteration's photon paths are dealt
     uint lane_capacity;         // photons that an invocation can store
     uint photon_capacity;       // photons that a batch can store

@@ -49,14 +49,27 @@ Corner corner_at(uint i) {
     return Corner(sets.xy, sets.zw, rest.xy, rest.z, uintBitsToFloat(rest.w));
 }
 
-Place place_at(uint triangle, vec2 uv) {
+Place place_at(PlacedTriangle at, vec2 uv) {
     Place place = Place(vec4(0.0), vec4(0.0), vec4(0.0));
+    bool is_placed = is_placed(at.instance);
+    Instance instance;
+    if (is_placed) {
+        instance = instance_at(at.instance);
+    }
     for (uint i = 0u; i < 3u; i++) {
-        Corner corner = corner_at(3u * triangle + i);
+        Corner corner = corner_at(3u * at.triangle + i);
         float weight = i == 0u ? 1.0 - uv.x - uv.y : (i == 1u ? uv.x : uv.y);
         place.sets += weight * vec4(corner.first, corner.second);
         place.color += weight * vec4(unpackHalf2x16(corner.color.x), unpackHalf2x16(corner.color.y));
-        place.tangent += weight * vec4(decode_direction(corner.tangent) * abs(corner.bitangent), corner.bitangent);
+        vec3 tangent = decode_direction(corner.tangent);
+        if (is_placed) {
+            // It follows the surface as its edges do. Mirroring turns normal × tangent round, but not the bitangent.
+            vec4 direction = vec4(tangent, 0.0);
+            tangent = normalize(vec3(dot(instance.rows[0], direction), dot(instance.rows[1], direction),
+                                     dot(instance.rows[2], direction)));
+            corner.bitangent *= instance.mirrored != 0u ? -1.0 : 1.0;
+        }
+        place.tangent += weight * vec4(tangent * abs(corner.bitangent), corner.bitangent);
     }
     return place;
 }
@@ -117,9 +130,8 @@ vec4 texture_value(uint index, Place place) {
     return value;
 }
 
-// The normal that a texture leans to, on the side of the geometric one.
-vec3 leaning_normal(Surface surface, Place place, vec3 value, float scale) {
-    vec3 n = surface.shading_normal;
+// The normal that a texture leans n to, on the side of the geometric one.
+vec3 leaning_normal(vec3 n, Surface surface, Place place, vec3 value, float scale) {
     vec3 t = place.tangent.xyz - dot(place.tangent.xyz, n) * n;
     float length2 = dot(t, t);
     if (length2 < 1e-12 || place.tangent.w == 0.0) {
@@ -144,10 +156,18 @@ Material material_of(inout Surface surface) {
     Place place = place_at(surface.triangle, surface.uv);
     uvec4 first = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 5u);
     uvec4 second = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 6u);
+    uvec4 third = uvec4(NO_TEXTURE);
+    float coat_normal_scale = 0.0;
+    if (CLEARCOAT) {
+        third.xy = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 8u).zw;
+        uvec4 rest = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 9u);
+        third.z = rest.x;
+        coat_normal_scale = uintBitsToFloat(rest.y);
+    }
     material.base_color *= place.color.rgb;
     // One loop, so that the code that looks a texture up is there once.
-    for (uint i = 0u; i < 7u; i++) {
-        uint index = i < 4u ? first[i] : second[i - 4u];
+    for (uint i = 0u; i < 7u || (CLEARCOAT && i < 10u); i++) {
+        uint index = i < 4u ? first[i] : (i < 7u ? second[i - 4u] : third[i - 7u]);
         if (index == NO_TEXTURE) {
             continue;
         }
@@ -158,7 +178,8 @@ Material material_of(inout Surface surface) {
             material.roughness *= value.g;
             material.metallic *= value.b;
         } else if (i == 2u) {
-            surface.shading_normal = leaning_normal(surface, place, value.rgb, uintBitsToFloat(second.w));
+            surface.shading_normal =
+                leaning_normal(surface.shading_normal, surface, place, value.rgb, uintBitsToFloat(second.w));
         } else if (i == 3u) {
             material.emission *= value.rgb;
         } else if (i == 4u) {
@@ -166,8 +187,15 @@ Material material_of(inout Surface surface) {
         } else if (i == 5u) {
             material.specular_f0 *= value.a;
             material.specular_f90 *= value.a;
-        } else {
+        } else if (i == 6u) {
             material.specular_f0 *= value.rgb;
+        } else if (CLEARCOAT && i == 7u) {
+            material.coat *= value.r;
+        } else if (CLEARCOAT && i == 8u) {
+            material.coat_roughness *= value.g;
+        } else if (CLEARCOAT) {
+            surface.coat_normal =
+                leaning_normal(surface.coat_normal, surface, place, value.rgb, coat_normal_scale);
         }
     }
     material.base_color = min(material.base_color, 1.0);

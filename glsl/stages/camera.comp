@@ -19,6 +19,7 @@ layout(local_size_x = 64) in;
 #include "contact.glsl"
 #include "environment.glsl"
 #include "light.glsl"
+#include "glint.glsl"
 #include "visible_point.glsl"
 #include "status.glsl"
 
@@ -42,7 +43,7 @@ struct Branch {
     vec3 throughput;
     vec3 emitted;
     uint depth;
-    uint ignored;
+    PlacedTriangle ignored;
     uint medium;          // material that it is in, or VACUUM
     float wavelength;     // nm; 0: of all
     bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
@@ -63,7 +64,7 @@ struct Glimpse {
     bool dark; // nothing is there that scatters light
 };
 
-Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium, Random random) {
+Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, uint medium, Random random) {
     Hit hit = trace_visible(origin, direction, 1e30, ignored, false, random);
     if (loops_cut) {
         return Glimpse(vec3(0.0), true);
@@ -73,55 +74,13 @@ Glimpse glimpse(vec3 origin, vec3 direction, uint ignored, uint medium, Random r
     }
     Encounter met = encounter(hit, direction, medium);
     bool dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
-    vec3 emission = emits(met.material, met.facing.front) ? met.material.emission : vec3(0.0);
+    vec3 emission = emits(met.material, met.facing.front)
+                        ? emitted_radiance(met.material, -dot(direction, met.facing.geometric_normal))
+                        : vec3(0.0);
     if (ABSORPTION) {
         emission *= transmittance(met.through, hit.t);
     }
     return Glimpse(emission, dark);
-}
-
-// What a narrow reflection, or a rough boundary of glass, shows of the lights without extent, which no direction from it meets:
-// by a ray to one of them or, where visible points are found once, to each.
-vec3 glint(Encounter met, Material material, vec3 viewer, inout Random random) {
-    vec4 u = next4(random);
-    uint chosen = choose_light(u.x, u.yz).light;
-    bool of_one = settings.slots_per_pixel == 1u;
-    uint begin = of_one ? chosen : 0u;
-    uint end = of_one ? chosen + 1u : settings.light_count;
-    Facing facing = met.facing;
-    vec3 sum = vec3(0.0);
-    for (uint i = begin; i < end && !loops_cut; i++) {
-        Light light = light_at(i);
-        if (!is_punctual(light.kind)) {
-            continue;
-        }
-        PunctualLight punctual = punctual_light_at(i);
-        vec3 origin = origin_towards(met.surface, arriving_from(punctual, light.kind, met.surface.position).ray);
-        Arriving arriving = arriving_from(punctual, light.kind, origin);
-        vec3 direction = normalize(arriving.ray);
-        float cosine = dot(direction, facing.shading_normal);
-        bool above = dot(direction, facing.geometric_normal) > 0.0;
-        bool fits = above ? cosine > 0.0 : cosine < 0.0 && is_dielectric(material);
-        if (!fits || largest(arriving.irradiance) <= 0.0 || dot(viewer, facing.shading_normal) <= 0.0) {
-            continue;
-        }
-        if (trace_visible(origin, arriving.ray, arriving.end, MISS, true, random).triangle != MISS) {
-            continue;
-        }
-        vec3 value;
-        if (is_dielectric(material)) {
-            value = rough_boundary(facing, material, met.outside, met.tint, viewer, direction);
-            if (ABSORPTION) {
-                value *= transmittance(above ? met.through : met.beyond, length(arriving.ray) * arriving.end);
-            }
-        } else {
-            Reflector reflector = reflector_of(material);
-            reflector.diffuse = vec3(0.0);
-            value = cosine * brdf(reflector, facing.shading_normal, viewer, direction);
-        }
-        sum += value * arriving.irradiance / (of_one ? light.probability : 1.0);
-    }
-    return sum;
 }
 
 // Follows what a boundary of microfacets reflects, or none of it where that would fly into the surface.
@@ -168,7 +127,7 @@ void main() {
     branch.throughput = vec3(1.0);
     branch.emitted = vec3(0.0);
     branch.depth = 0u;
-    branch.ignored = MISS;
+    branch.ignored = NO_TRIANGLE;
     branch.medium = VACUUM;
     branch.wavelength = 0.0;
     branch.reflection_seen = false;
@@ -177,7 +136,7 @@ void main() {
     bool alive = inside;
     bool cut = false;
     VisiblePoint visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
-    Gloss gloss = Gloss(vec4(0.0), vec4(0.0));
+    Gloss gloss = Gloss(vec4(0.0), uvec4(0u));
     while (alive) {
         loop_count += 1u;
         bool ended = true;
@@ -190,20 +149,31 @@ void main() {
             Surface surface = met.surface;
             Material material = met.material;
             Facing facing = met.facing;
+            bool culled = CULLING && branch.depth == 0u && !facing.front && (material.sides & BACK_HIDDEN) != 0u;
+            if (culled) {
+                branch.origin = origin_towards(surface, branch.direction);
+                branch.ignored = surface.triangle;
+                continue;
+            }
             if (ABSORPTION) {
                 branch.throughput *= transmittance(met.through, hit.t);
             }
             if (emits(material, facing.front)) {
-                branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * material.emission;
+                vec3 emission = emitted_radiance(material, -dot(branch.direction, facing.geometric_normal));
+                branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * emission;
             }
             branch.emission_seen = false;
-            // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
-            Reflector reflector = NO_REFLECTOR;
-            reflector.diffuse = material.base_color;
             if (is_mixed(material)) {
                 u = next4(random);
                 choose_part(material, u.x);
             }
+            if (is_coated(material)) {
+                u = next4(random);
+                branch.throughput *= choose_layer(material, facing, surface, branch.direction, u.x);
+            }
+            // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
+            Reflector reflector = NO_REFLECTOR;
+            reflector.diffuse = material.base_color;
             if (is_glossy(material)) {
                 reflector = reflector_of(material);
             }
@@ -217,11 +187,15 @@ void main() {
                 branch.ignored = surface.triangle;
                 u = next4(random);
                 if (is_mirror(material)) {
-                    branch.throughput *= fresnel_schlick(material.base_color, dot(viewer, facing.shading_normal));
+                    float cosine = dot(viewer, facing.shading_normal);
+                    branch.throughput *= fresnel_schlick(material.base_color, cosine);
+                    if (is_coated(material)) {
+                        branch.throughput *= coat_passes(material.coat, cosine);
+                    }
                     branch.direction = mirror_direction(facing, branch.direction);
                 } else if (is_glossy(material)) {
                     if (PUNCTUAL_LIGHTS && reflector.alpha >= SMOOTH_ALPHA) {
-                        branch.emitted += branch.throughput * glint(met, material, viewer, random);
+                        branch.emitted += branch.throughput * glint(met, material, facing, reflector, viewer, random);
                     }
                     Branch reflected = branch;
                     float p = reflection_probability(reflector, dot(viewer, facing.shading_normal));
@@ -247,7 +221,8 @@ void main() {
                     }
                     bool rough = ROUGH_GLASS && material.roughness * material.roughness >= SMOOTH_ALPHA;
                     if (PUNCTUAL_LIGHTS && rough) {
-                        branch.emitted += branch.throughput * glint(met, material, viewer, random);
+                        branch.emitted +=
+                            branch.throughput * glint(met, material, facing, reflector, viewer, random);
                     }
                     Boundary boundary = meet_boundary(facing, branch.direction, material, met.outside, u.yz);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
@@ -280,7 +255,7 @@ void main() {
                         branch.emission_seen = reflect_now;
                     }
                     branch.direction = reflect_now ? boundary.reflected : boundary.refracted;
-                    branch.throughput *= reflect_now ? vec3(boundary.reflected_weight) : transmission;
+                    branch.throughput *= reflect_now ? boundary.reflected_weight : transmission;
                     branch.medium = reflect_now ? met.through : met.beyond;
                     ended = largest(branch.throughput) <= 0.0;
                 }

@@ -46,11 +46,11 @@ Side side_of(Surface surface, vec3 direction) {
 }
 
 // Whether a ray leaves the object that was entered at that side.
-bool leaves(vec3 origin, vec3 direction, uint ignored, Side entered) {
+bool leaves(vec3 origin, vec3 direction, PlacedTriangle ignored, Side entered) {
     Hit hit = trace(origin, direction, 1e30, ignored, false);
     bool left = false;
     if (hit.triangle != MISS) {
-        Side side = side_of(surface_at(hit.triangle, vec2(hit.u, hit.v)), direction);
+        Side side = side_of(surface_at(hit), direction);
         left = side.object == entered.object && side.front != entered.front;
     }
     return left;
@@ -64,14 +64,14 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     // Along the surface, into other objects and out of them again.
     bool inside = false;
     Side entered;
-    uint ignored = MISS;
+    PlacedTriangle ignored = NO_TRIANGLE;
     float done = 0.0;
     for (uint i = 0u; i < MOST_CROSSINGS; i++) {
         Hit hit = trace(origin + done * along, (1.0 - done) * along, 1.0, ignored, false);
         if (hit.triangle == MISS) {
             break;
         }
-        Surface surface = surface_at(hit.triangle, vec2(hit.u, hit.v));
+        Surface surface = surface_at(hit);
         if (surface.object == object) {
             return true; // the surface bends up
         }
@@ -81,24 +81,27 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
             entered = side_of(surface, along);
         }
         done += hit.t * (1.0 - done);
-        ignored = hit.triangle;
+        ignored = triangle_of(hit);
     }
     // An open sheet has been crossed, but encloses nothing.
     if (inside && leaves(origin + along, along, ignored, entered) && leaves(origin + along, n, ignored, entered)) {
         return false;
     }
     // Then down: it may bend, but it must be there, under glass that lies on it too.
-    Hit below = trace(origin + along, -radius * n, 1.0, MISS, false);
+    Hit below = trace(origin + along, -radius * n, 1.0, NO_TRIANGLE, false);
     if (CONTACT && below.triangle != MISS) {
         ShadingTriangle met = shading_triangle(below.triangle);
+        if (is_placed(below.instance)) {
+            met.object = instance_at(below.instance).object;
+        }
         if (met.object != object && is_dielectric(material_at(met.material))) {
-            below = trace(origin + along, -radius * n, 1.0, below.triangle, false);
+            below = trace(origin + along, -radius * n, 1.0, triangle_of(below), false);
         }
     }
     if (below.triangle == MISS) {
         return false;
     }
-    Surface there = surface_at(below.triangle, vec2(below.u, below.v));
+    Surface there = surface_at(below);
     return there.object == object && share_there(there) > 0.0;
 }
 

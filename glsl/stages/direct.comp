@@ -42,7 +42,7 @@ const float ENDS_BEFORE = 16.0 / 16777216.0;
 struct Question {
     vec3 ray;
     float end;       // of the ray, in its lengths
-    uint ignored;    // a triangle
+    PlacedTriangle ignored;
     uint kind;       // of the light
     Surface emitter; // triangle: the light's point
     Sky sky;         // environment
@@ -56,7 +56,7 @@ Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
     Question question;
     question.kind = light.kind;
     question.end = 1e30;
-    question.ignored = MISS;
+    question.ignored = NO_TRIANGLE;
     if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
         Arriving arriving = arriving_from(punctual_light_at(chosen), light.kind, origin);
         question.ray = arriving.ray;
@@ -65,11 +65,12 @@ Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
     } else if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
         question.sky = sample_environment(u.yz, question.ray);
     } else {
-        Surface emitter = surface_at(light.triangle, triangle_point(u.yz));
+        PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
+        Surface emitter = surface_at(triangle, triangle_point(u.yz));
         // Both ends move off their surfaces.
         question.ray = origin_towards(emitter, position - emitter.position) - origin;
         question.end = 1.0 - ENDS_BEFORE;
-        question.ignored = light.triangle;
+        question.ignored = triangle;
         question.emitter = emitter;
     }
     return question;
@@ -91,7 +92,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     Question question;
     question.ray = cosine_direction(shading_normal, u.yz);
     question.end = 1e30;
-    question.ignored = MISS;
+    question.ignored = NO_TRIANGLE;
     // A reflection may be too narrow for points of lights to find it.
     Reflector reflector = NO_REFLECTOR;
     vec3 viewer = vec3(0.0);
@@ -145,7 +146,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
             if (missed) {
                 return vec3(0.0);
             }
-            emitter = surface_at(hit.triangle, vec2(hit.u, hit.v));
+            emitter = surface_at(hit);
         }
         if (emitter.light == NO_LIGHT) {
             return vec3(0.0);
@@ -161,7 +162,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
         }
         // A ray that met the light had its chance to pass it.
         float there = by_bsdf ? 1.0 : share_there(emitter);
-        radiance = there * material.emission;
+        radiance = there * emitted_radiance(material, abs(cos_light));
         of_light = light.probability * distance2 / (light.area * abs(cos_light));
     }
     float cos_surface = dot(direction, shading_normal);

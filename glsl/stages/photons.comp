@@ -44,7 +44,7 @@ struct Path {
     vec3 direction;
     vec3 flux;
     uint depth;
-    uint ignored;
+    PlacedTriangle ignored;
     uint medium; // material that it is in, or VACUUM
     float wavelength; // nm; 0: of all
     bool seen_directly; // no specular bounce since the light: direct light, which `direct` samples
@@ -132,13 +132,11 @@ void main() {
             continue;
         }
         vec4 u = next4(random);
-        bool stores = choose_part(material, u.w) || is_matte(material) || is_glossy(material);
+        bool stores = choose_part(material, u.w) || is_matte(material) || is_glossy(material) ||
+                      (is_coated(material) && material.coat_roughness * material.coat_roughness >= FOLLOWED_ALPHA);
         vec3 landing = path.flux;
         if (stores) {
-            // A photon's flux is per area of the surface; the shading normal's cosine replaces the geometric one's:
-            // Veach, «Robust Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
-            float correction = dot(incoming, facing.shading_normal) / dot(incoming, facing.geometric_normal);
-            landing *= correction;
+            landing *= landing_correction(facing, incoming);
             if (!finite(landing)) {
                 non_finite += 1u;
             } else if (!(SAMPLE_LIGHTS && path.seen_directly)) {
@@ -154,6 +152,11 @@ void main() {
             }
         }
         path.seen_directly = false;
+        float layer = 1.0;
+        if (is_coated(material)) {
+            layer = choose_layer(material, facing, surface, incoming, next4(random).x);
+            landing = path.flux * (layer * landing_correction(facing, incoming));
+        }
         if (is_matte(material) || is_glossy(material)) {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             vec3 outgoing = cosine_direction(facing.geometric_normal, u.xy);
@@ -166,7 +169,10 @@ void main() {
             path.direction = outgoing;
         } else if (is_mirror(material)) {
             float cos_i = -dot(incoming, facing.shading_normal);
-            alive = survives(path.flux, path.flux * fresnel_schlick(material.base_color, cos_i), u.z);
+            if (is_coated(material)) {
+                layer *= coat_passes(material.coat, cos_i);
+            }
+            alive = survives(path.flux, path.flux * layer * fresnel_schlick(material.base_color, cos_i), u.z);
             path.direction = mirror_direction(facing, incoming);
         } else if (DIELECTRICS) {
             if (DISPERSION) {
@@ -174,8 +180,8 @@ void main() {
             }
             Boundary boundary = meet_boundary(facing, incoming, material, met.outside, u.yw);
             bool reflected = u.x < boundary.reflectance;
-            vec3 weight = reflected ? vec3(boundary.reflected_weight) : met.tint * boundary.refracted_weight;
-            alive = survives(path.flux, path.flux * weight, u.z);
+            vec3 weight = reflected ? boundary.reflected_weight : met.tint * boundary.refracted_weight;
+            alive = survives(path.flux, path.flux * (layer * weight), u.z);
             path.direction = reflected ? boundary.reflected : boundary.refracted;
             path.medium = reflected ? met.through : met.beyond;
         }

@@ -17,12 +17,16 @@ layout(push_constant) uniform Push {
 } push;
 
 layout(std430) readonly buffer ProbeFrom { vec4 rays[]; };  // origin, direction; w: unused
-layout(std430) writeonly buffer ProbeTo { vec4 hits[]; };   // t, u, v, uint bits of the triangle or MISS
+layout(std430) writeonly buffer ProbeTo { vec4 hits[]; };   // t, u, v, uint bits of the object or MISS
 
 void main() {
     uint i = invocation_index();
     if (i < push.count) {
-        Hit hit = trace(rays[2u * i].xyz, rays[2u * i + 1u].xyz, 1e30, MISS, false);
-        hits[i] = vec4(hit.t, hit.u, hit.v, uintBitsToFloat(loops_cut ? MISS : hit.triangle));
+        Hit hit = trace(rays[2u * i].xyz, rays[2u * i + 1u].xyz, 1e30, NO_TRIANGLE, false);
+        uint object = MISS;
+        if (hit.triangle != MISS && !loops_cut) {
+            object = surface_at(hit).object;
+        }
+        hits[i] = vec4(hit.t, hit.u, hit.v, uintBitsToFloat(object));
     }
 }

@@ -8,6 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::bench::{BenchFeatures, BenchGather, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
+use super::scene::SceneArguments;
 use crate::config::{Accel, Direct, Estimator, Sampler, TriangleTest};
 use crate::gather;
 
@@ -48,6 +49,8 @@ pub enum Command {
     Inspect {
         /// glTF file (.gltf or .glb).
         scene: PathBuf,
+        #[command(flatten)]
+        read: SceneArguments,
         /// As JSON.
         #[arg(long)]
         json: bool,
@@ -80,10 +83,8 @@ pub struct RenderArguments {
     /// glTF file to render (.gltf or .glb).
     #[arg(long, value_name = "FILE", required = true)]
     pub scene: Option<PathBuf>,
-    /// Light from all around the scene: an equirectangular picture (.hdr or .exr) or one radiance (R,G,B) [default: none, or
-    /// 1,1,1 for a scene without any light].
-    #[arg(long, value_name = "FILE|R,G,B", value_parser = environment)]
-    pub environment: Option<EnvironmentChoice>,
+    #[command(flatten)]
+    pub read: SceneArguments,
     /// Linear RGB OpenEXR picture [default: the scene's name with .exr, in the current folder].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -105,9 +106,6 @@ pub struct RenderArguments {
     /// Camera, by name or index [default: the scene's first].
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
-    /// Apply the scene's animations at this time, in seconds [default: everything at rest].
-    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = frame_time)]
-    pub frame_time: Option<f64>,
     /// Stop after so many iterations [default: 64 if there is neither --time nor --target-error].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub iterations: Option<u32>,
@@ -175,29 +173,6 @@ pub struct RenderArguments {
     pub quiet: bool,
 }
 
-/// What `--environment` asks for.
-#[derive(Debug, Clone, PartialEq)]
-pub enum EnvironmentChoice {
-    /// One radiance, linear RGB.
-    Constant([f32; 3]),
-    /// A picture.
-    Picture(PathBuf),
-}
-
-/// Three numbers, or else the name of a file.
-fn environment(text: &str) -> Result<EnvironmentChoice, String> {
-    let numbers: Option<Vec<f32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    let Some(Ok(radiance)) = numbers.map(<[f32; 3]>::try_from) else {
-        return Ok(EnvironmentChoice::Picture(text.into()));
-    };
-    let is_radiance = radiance.iter().all(|value| value.is_finite() && *value >= 0.0);
-    if is_radiance && radiance != [0.0; 3] {
-        Ok(EnvironmentChoice::Constant(radiance))
-    } else {
-        Err("a radiance must be finite and not negative, and above 0 in one channel".to_owned())
-    }
-}
-
 pub fn resolution(text: &str) -> Result<[u32; 2], String> {
     let parsed = text
         .split_once(['x', 'X'])
@@ -209,7 +184,7 @@ pub fn resolution(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-fn number(text: &str) -> Result<f64, String> {
+pub fn number(text: &str) -> Result<f64, String> {
     text.parse::<f64>().map_err(|_| "expected a number".to_owned())
 }
 
@@ -245,15 +220,6 @@ pub fn png_file(name: &str) -> Result<PathBuf, String> {
     match path.extension() {
         Some(extension) if extension.eq_ignore_ascii_case("png") => Ok(path),
         _ => Err("a PNG is written: its name must end in .png".to_owned()),
-    }
-}
-
-fn frame_time(text: &str) -> Result<f64, String> {
-    let time = number(text)?;
-    if time.is_finite() {
-        Ok(time)
-    } else {
-        Err("must be finite".to_owned())
     }
 }
 

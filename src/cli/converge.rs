@@ -8,12 +8,13 @@ use clap::{Args, ValueEnum};
 
 use super::args::seconds;
 use super::outputs::check_outputs;
+use super::scene::SceneArguments;
 use super::{Outcome, interrupt, print};
 use crate::bench::{Converge, Curve, converge, converge_table, csv, plot_convergence};
 use crate::config::{Direct, Estimator, RenderConfig, Sampler};
 use crate::film::{read_exr, write_whole};
 use crate::gather::METHODS;
-use crate::scene::{PackedScene, Scene};
+use crate::scene::PackedScene;
 
 /// `ppm-vk converge`.
 #[derive(Debug, Args)]
@@ -21,6 +22,8 @@ pub struct ConvergeArguments {
     /// glTF file.
     #[arg(long, value_name = "FILE")]
     scene: PathBuf,
+    #[command(flatten)]
+    read: SceneArguments,
     /// OpenEXR picture that it should become; its size is rendered.
     #[arg(long, value_name = "FILE")]
     reference: PathBuf,
@@ -127,12 +130,11 @@ fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfi
 /// Renders, prints the table, writes the files.
 pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
     let outputs = [&arguments.csv, &arguments.plot];
-    check_outputs(
-        &[&arguments.scene, &arguments.reference],
-        outputs.into_iter().filter_map(|file| file.as_deref()),
-    )?;
+    let mut inputs = arguments.read.inputs(&arguments.scene);
+    inputs.push(&arguments.reference);
+    check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
     let reference = read_exr(&arguments.reference)?;
-    let scene = Scene::load(&arguments.scene)?;
+    let scene = arguments.read.load(&arguments.scene, true)?;
     for warning in &scene.warnings {
         say!("warning: {warning}");
     }

@@ -6,8 +6,9 @@ use std::path::Path;
 use anyhow::Result;
 use serde_json::json;
 
-use super::progress::{BUILDING, READING, while_showing};
+use super::progress::{BUILDING, while_showing};
 use super::render::default_resolution;
+use super::scene::SceneArguments;
 use crate::config::RenderConfig;
 use crate::gather::{METHODS, default_method};
 use crate::gpu;
@@ -61,8 +62,8 @@ pub fn gathers() -> Result<String> {
 }
 
 /// `ppm-vk inspect`.
-pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
-    let scene = while_showing(READING, false, || Scene::load(path))?;
+pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<String> {
+    let scene = read.load(path, false)?;
     let packed = while_showing(BUILDING, false, || PackedScene::new(&scene))
         .map_err(|what| crate::error::Error::scene(path, what))?;
     let memory = memory(&scene, &packed);
@@ -73,9 +74,12 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
     let (low, high) = (to_world(low), to_world(high));
     if as_json {
         let value = json!({
-            "triangles": scene.triangles.len(),
+            "triangles": packed.seen_triangles(),
+            "stored_triangles": packed.shading_triangles.len(),
             "dropped_triangles": scene.dropped_triangles,
             "objects": scene.objects.len(),
+            "instances": packed.instances.len(),
+            "shared_primitives": packed.shared_primitives(),
             "materials": {
                 "matte": count(|s| matches!(s, Surface::Matte)),
                 "mirror": count(|s| matches!(s, Surface::Mirror)),
@@ -102,10 +106,19 @@ pub fn inspect(path: &Path, as_json: bool) -> Result<String> {
     writeln!(
         text,
         "triangles    {} ({} dropped)",
-        scene.triangles.len(),
+        packed.seen_triangles(),
         scene.dropped_triangles
     )?;
     writeln!(text, "objects      {}", scene.objects.len())?;
+    if packed.features.instanced {
+        writeln!(
+            text,
+            "instances    {} of {} shared primitives; {} triangles are stored",
+            packed.instances.len(),
+            packed.shared_primitives(),
+            packed.shading_triangles.len()
+        )?;
+    }
     writeln!(
         text,
         "materials    {} matte, {} mirror, {} dielectric, {} glossy",

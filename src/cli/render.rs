@@ -8,9 +8,9 @@ use anyhow::{Context, Result};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
-use super::args::{Arguments, BackendChoice, EnvironmentChoice, RenderArguments};
+use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::outputs::check_outputs;
-use super::progress::{BUILDING, Limits, Progress, READING, while_showing, with_prefix};
+use super::progress::{BUILDING, Limits, Progress, while_showing, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
 use crate::config::{Estimator, RenderConfig, Sampler};
@@ -20,7 +20,7 @@ use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
 use crate::report::{Profile, Subject};
-use crate::scene::{Camera, Environment, LoadOptions, PackedScene, Scene};
+use crate::scene::{Camera, PackedScene};
 
 /// Width of a picture without --resolution.
 const DEFAULT_WIDTH: u32 = 1280;
@@ -35,24 +35,11 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let (backend_choice, gather) = choose_backend(arguments);
     let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
     // Before any work: nobody wants to learn after an hour that the picture can't be written.
-    let mut inputs = vec![path];
-    if let Some(EnvironmentChoice::Picture(picture)) = &arguments.environment {
-        inputs.push(picture);
-    }
-    check_outputs(&inputs, outputs(arguments, &output))?;
+    check_outputs(&arguments.read.inputs(path), outputs(arguments, &output))?;
     interrupt::install()?;
 
-    let environment = match &arguments.environment {
-        None => None,
-        Some(EnvironmentChoice::Constant(radiance)) => Some(Environment::constant((*radiance).into())),
-        Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture)?),
-    };
-    let options = LoadOptions {
-        frame_time: arguments.frame_time,
-        environment,
-    };
     let quiet = arguments.quiet;
-    let scene = while_showing(READING, quiet, || Scene::load_with(path, options))?;
+    let scene = arguments.read.load(path, quiet)?;
     for warning in &scene.warnings {
         say!("warning: {warning}");
     }
@@ -65,10 +52,11 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let packed = while_showing(BUILDING, quiet, || PackedScene::new(&scene))
         .map_err(|what| crate::error::Error::scene(path, what))?;
     let features = &packed.features;
-    if config.estimator == Estimator::Ppm && (features.dispersion || features.alpha || features.partly_clear) {
+    let chooses = features.dispersion || features.alpha || features.partly_clear || features.coat;
+    if config.estimator == Estimator::Ppm && chooses {
         say!(
-            "warning: --estimator ppm finds visible points once: where a wavelength, alpha or a part of the light is chosen by \
-             chance, each pixel keeps its first choice; use --estimator sppm"
+            "warning: --estimator ppm finds visible points once: where a wavelength, alpha, a coat or a part of the light is chosen \
+             by chance, each pixel keeps its first choice; use --estimator sppm"
         );
     }
     let mut backend = open(backend_choice, arguments.device.as_deref(), &packed, camera, &config)?;

@@ -6,21 +6,23 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::boundary::Boundary;
 use super::contact::{Encounter, choose_part, is_mixed, transmittance};
 use super::dispersion::disperse;
 use super::environment::Environment;
-use super::gloss::{FOLLOWED_ALPHA, Reflector, SMOOTH_ALPHA};
-use super::intersect::Ray;
-use super::light::{Arriving, arriving_from, choose_light, emits, is_punctual};
+use super::glint::glint;
+use super::gloss::{FOLLOWED_ALPHA, Reflector};
+use super::intersect::{PlacedTriangle, Ray};
+use super::light::{emits, emitted_radiance};
 use super::random::{PathKind, Random};
 use super::sampling::{disc_point, encode_direction};
-use super::surface::{Boundary, DIELECTRIC, Facing, GLOSSY, MATTE, MIRROR, Surface, rough_boundary};
+use super::surface::{Facing, GLOSSY, MATTE, MIRROR, Surface};
 use super::texture::nearest_visible;
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{Gloss, Light, Material, NO_OBJECT, VisiblePoint};
+use crate::layout::{BACK_HIDDEN, Gloss, NO_OBJECT, VisiblePoint};
 
 /// What is left of a path that splits.
 #[derive(Clone, Copy)]
@@ -29,7 +31,7 @@ struct Branch {
     throughput: DVec3,
     emitted: DVec3,
     depth: u32,
-    ignored: Option<u32>,
+    ignored: Option<PlacedTriangle>,
     /// Material that it is in.
     medium: Option<u32>,
     /// Of its light, nm.
@@ -41,7 +43,13 @@ struct Branch {
 }
 
 /// Radiance of the first surface on a ray's way, and whether nothing is there that scatters light.
-fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u32>, random: &Random) -> (DVec3, bool) {
+fn glimpse(
+    inputs: &Inputs<'_>,
+    ray: Ray,
+    ignored: Option<PlacedTriangle>,
+    medium: Option<u32>,
+    random: &Random,
+) -> (DVec3, bool) {
     let Some(hit) = nearest_visible(inputs, ray, FAR, ignored, random) else {
         return (
             Environment::of(&inputs.scene.environment).at(ray.direction).radiance,
@@ -52,49 +60,11 @@ fn glimpse(inputs: &Inputs<'_>, ray: Ray, ignored: Option<u32>, medium: Option<u
     let material = met.surface.material;
     let dark = material.surface == MATTE && rgb(material.base_color).max_element() == 0.0;
     if emits(&material, met.facing.front) {
-        (rgb(material.emission) * transmittance(inputs, met.through, hit.t), dark)
+        let emission = emitted_radiance(&material, -ray.direction.dot(met.facing.geometric_normal));
+        (emission * transmittance(inputs, met.through, hit.t), dark)
     } else {
         (DVec3::ZERO, dark)
     }
-}
-
-/// What a narrow reflection, or a rough boundary of glass, shows of the lights without extent, which no direction from it meets.
-fn glint(inputs: &Inputs<'_>, met: &Encounter, material: &Material, viewer: DVec3, random: &mut Random) -> DVec3 {
-    let [u, first_digits, second_digits, _] = random.next4();
-    let lights = &inputs.scene.lights;
-    let chosen = choose_light(lights, u, [first_digits, second_digits]).light;
-    let of_one = inputs.settings.slots_per_pixel == 1;
-    let asked = if of_one { std::slice::from_ref(chosen) } else { lights };
-    let (surface, facing) = (&met.surface, &met.facing);
-    let is_glass = material.surface == DIELECTRIC;
-    let boundary = Reflector {
-        diffuse: DVec3::ZERO,
-        ..Reflector::of_material(material)
-    };
-    let from = |light: &Light| {
-        let origin = surface.origin_towards(arriving_from(light, surface.position).ray);
-        let Arriving { ray, end, irradiance } = arriving_from(light, origin);
-        let direction = ray.normalize();
-        let cosine = direction.dot(facing.shading_normal);
-        let above = direction.dot(facing.geometric_normal) > 0.0;
-        let fits = if above { cosine > 0.0 } else { cosine < 0.0 && is_glass };
-        if !fits || irradiance.max_element() <= 0.0 || viewer.dot(facing.shading_normal) <= 0.0 {
-            return DVec3::ZERO;
-        }
-        let to_light = Ray { origin, direction: ray };
-        if nearest_visible(inputs, to_light, end, None, random).is_some() {
-            return DVec3::ZERO;
-        }
-        let value = if is_glass {
-            let medium = if above { met.through } else { met.beyond };
-            rough_boundary(facing, material, met.outside, met.tint, [viewer, direction])
-                * transmittance(inputs, medium, ray.length() * end)
-        } else {
-            cosine * boundary.brdf(facing.shading_normal, viewer, direction)
-        };
-        value * irradiance / if of_one { f64::from(light.probability) } else { 1.0 }
-    };
-    asked.iter().filter(|light| is_punctual(light)).map(from).sum()
 }
 
 /// Visible points, in slot order: as many for each pixel slot as
@@ -242,11 +212,16 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             };
             let incoming = branch.ray.direction;
             let met = Encounter::new(inputs, hit, incoming, branch.medium);
-            let (surface, facing) = (&met.surface, &met.facing);
+            let (surface, mut facing) = (met.surface, met.facing);
+            if branch.depth == 0 && !facing.front && surface.material.sides & BACK_HIDDEN != 0 {
+                branch.ray.origin = surface.origin_towards(incoming);
+                branch.ignored = Some(surface.triangle);
+                continue;
+            }
             branch.throughput *= transmittance(inputs, met.through, hit.t);
             let base_color = rgb(surface.material.base_color);
             if emits(&surface.material, facing.front) {
-                let emission = rgb(surface.material.emission);
+                let emission = emitted_radiance(&surface.material, -incoming.dot(facing.geometric_normal));
                 branch.emitted += if branch.emission_seen {
                     DVec3::ZERO
                 } else {
@@ -258,6 +233,10 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             if is_mixed(&material) {
                 choose_part(&mut material, random.next4()[0]);
             }
+            if material.coat > 0.0 {
+                let [u, ..] = random.next4();
+                branch.throughput *= facing.choose_layer(&mut material, surface.coat_normal, incoming, u);
+            }
             let kind = material.surface;
             let (is_matte, is_glossy) = (kind == MATTE, kind == GLOSSY);
             // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
@@ -267,7 +246,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 Reflector::matte(base_color)
             };
             if is_matte || (is_glossy && reflector.alpha >= FOLLOWED_ALPHA) {
-                break seen(inputs, &branch, surface, facing, reflector);
+                break seen(inputs, &branch, &surface, &facing, reflector);
             }
             if branch.depth + 1 >= settings.max_depth {
                 counts.add_truncated(1);
@@ -278,7 +257,8 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let [choice, second, third, _] = random.next4();
             if is_glossy {
                 if inputs.scene.features.punctual && !reflector.is_smooth() {
-                    branch.emitted += branch.throughput * glint(inputs, &met, &material, -incoming, &mut random);
+                    let seen = glint(inputs, &met, &material, &facing, &reflector, incoming, &mut random);
+                    branch.emitted += branch.throughput * seen;
                 }
                 let p = reflector.reflection_probability(-incoming.dot(facing.shading_normal));
                 let (direction, weight) = facing.follow(&reflector, incoming, [second, third]);
@@ -309,18 +289,19 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 } else {
                     branch.throughput /= 1.0 - p;
                 }
-                break seen(inputs, &branch, surface, facing, stopping);
+                break seen(inputs, &branch, &surface, &facing, stopping);
             }
             branch.ray.direction = if kind == MIRROR {
-                branch.throughput *= facing.mirror_reflectance(surface.material.base_color, incoming);
+                branch.throughput *= facing.mirror_reflectance(&material, incoming);
                 facing.reflect(incoming)
             } else {
                 branch.throughput *= disperse(&mut material, &mut branch.wavelength, &mut random);
-                let rough = f64::from(material.roughness).powi(2) >= SMOOTH_ALPHA;
-                if inputs.scene.features.punctual && rough {
-                    branch.emitted += branch.throughput * glint(inputs, &met, &material, -incoming, &mut random);
+                let microfacets = reflector.with_alpha(f64::from(material.roughness).powi(2));
+                if inputs.scene.features.punctual && !microfacets.is_smooth() {
+                    let seen = glint(inputs, &met, &material, &facing, &microfacets, incoming, &mut random);
+                    branch.emitted += branch.throughput * seen;
                 }
-                let boundary = Boundary::new(facing, incoming, &material, met.outside, [second, third]);
+                let boundary = Boundary::new(&facing, incoming, &material, met.outside, [second, third]);
                 // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
                 let transmission = met.tint * boundary.eta.powi(2) * boundary.refracted_weight;
                 match boundary.refracted {

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::Inputs;
 use super::intersect::{Hit, Ray, nearest_hit};
-use super::surface::{DIELECTRIC, Facing, GLOSSY, ROUNDINGS, Surface, surface_at};
+use super::surface::{DIELECTRIC, Facing, GLOSSY, ROUNDINGS, Surface, surface_of};
 use super::texture::{apply_textures, share_there};
 use super::vector::rgb;
 use crate::layout::{Material, TOUCHED};
@@ -28,12 +28,12 @@ impl Encounter {
     /// the two; on something opaque that is what the ray meets. `medium`: the material that the ray is in, as far as its
     /// path knows.
     pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, medium: Option<u32>) -> Self {
-        let at = |hit: Hit| surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+        let at = |hit: Hit| surface_of(inputs.scene, hit);
         let textured = |mut surface: Surface| {
             apply_textures(inputs.scene, &mut surface);
             surface
         };
-        let surface = textured(at(hit));
+        let mut surface = textured(at(hit));
         let own = Some(surface.material_index);
         let solid = surface.material.surface == DIELECTRIC && surface.material.thin == 0;
         let (through, beyond) = match (solid, Facing::new(&surface, incoming).front) {
@@ -53,17 +53,32 @@ impl Encounter {
             return alone(surface);
         }
         let n = surface.geometric_normal;
-        let step = ROUNDINGS * n.abs().dot(surface.reach);
-        let probe = ROUNDINGS * surface.reach.element_sum() * n;
+        let instanced = inputs.scene.features.instanced;
+        // Where an instance puts its corners is uncertain by more than their own rounding, but by no more than of the scene.
+        let size = surface.reach.element_sum().max(if instanced { 1.0 } else { 0.0 });
+        let probe = ROUNDINGS * size * n;
         let through = Ray {
             origin: surface.position + probe,
             direction: -2.0 * probe,
         };
         let touches = |other: &Surface| {
+            let step = ROUNDINGS * n.abs().dot(if instanced { other.reach } else { surface.reach });
             other.object != surface.object && (other.position - surface.position).dot(n).abs() <= step
         };
-        let other = nearest_hit(inputs, through, 1.0, Some(hit.triangle)).map(at);
-        match other.filter(touches) {
+        let other = nearest_hit(inputs, through, 1.0, Some(hit.at)).map(|hit| {
+            let mut other = at(hit);
+            if instanced {
+                other.reach = other.reach.max(surface.reach);
+            }
+            other
+        });
+        let other = other.filter(touches);
+        if let Some(other) = &other
+            && instanced
+        {
+            surface.reach = other.reach;
+        }
+        match other {
             Some(other) if other.material.surface != DIELECTRIC => {
                 // What isn't there everywhere is all there or not at all here.
                 if share_there(inputs.scene, &other) >= 0.5 {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::intersect::{Ray, nearest_hit};
 use super::random::{PathKind, Random};
 use super::sampling::{basis, decode_direction, disc_point};
-use super::surface::{DIELECTRIC, Surface, offset_origin, reach_of, surface_at};
+use super::surface::{DIELECTRIC, Surface, offset_origin, reach_of, surface_of};
 use super::texture::share_there;
 use super::vector::{word, xyz};
 use super::{FAR, Inputs};
@@ -61,11 +61,6 @@ impl Side {
 
 fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f64, v: f64) -> bool {
     let object = word(point.position_object);
-    let object_of = |triangle: u32| inputs.scene.shading_triangles[triangle as usize].object;
-    let surface_of = |triangle: u32| {
-        let triangle = &inputs.scene.shading_triangles[triangle as usize];
-        inputs.scene.materials[triangle.material as usize].surface
-    };
     let n = decode_direction(word(point.weight_normal));
     let origin = offset_origin(xyz(point.position_object), n, reach_of(inputs.scene, object));
     let along = basis(n) * (radius * disc_point(u, v)).extend(0.0);
@@ -79,7 +74,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
         let Some(hit) = nearest_hit(inputs, ray, 1.0, ignored) else {
             break;
         };
-        let surface = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+        let surface = surface_of(inputs.scene, hit);
         if surface.object == object {
             return true; // the surface bends up
         }
@@ -89,7 +84,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
             entered = if entered.is_none() { Some(side) } else { None };
         }
         done += hit.t * (1.0 - done);
-        ignored = Some(hit.triangle);
+        ignored = Some(hit.at);
     }
     // An open sheet has been crossed, but encloses nothing.
     let leaves = |direction: DVec3, entered: Side| {
@@ -98,7 +93,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
             direction,
         };
         nearest_hit(inputs, ray, FAR, ignored).is_some_and(|hit| {
-            let left = Side::of(&surface_at(inputs.scene, hit.triangle, hit.u, hit.v), direction);
+            let left = Side::of(&surface_of(inputs.scene, hit), direction);
             left.object == entered.object && left.front != entered.front
         })
     };
@@ -113,13 +108,14 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
     let mut below = nearest_hit(inputs, down, 1.0, None);
     if let Some(hit) = below
         && inputs.scene.features.contact
-        && object_of(hit.triangle) != object
-        && surface_of(hit.triangle) == DIELECTRIC
+        && let met = surface_of(inputs.scene, hit)
+        && met.object != object
+        && met.material.surface == DIELECTRIC
     {
-        below = nearest_hit(inputs, down, 1.0, Some(hit.triangle));
+        below = nearest_hit(inputs, down, 1.0, Some(hit.at));
     }
     below.is_some_and(|hit| {
-        let there = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+        let there = surface_of(inputs.scene, hit);
         there.object == object && share_there(inputs.scene, &there) > 0.0
     })
 }

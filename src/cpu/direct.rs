@@ -9,13 +9,13 @@ use rayon::prelude::*;
 use super::camera::SeenSlice;
 use super::environment::{Environment, Sky};
 use super::gloss::Reflector;
-use super::intersect::Ray;
-use super::light::{Arriving, arriving_from, choose_light, emits, is_punctual};
+use super::intersect::{PlacedTriangle, Ray};
+use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
 use super::random::{PathKind, Random};
 use super::sampling::{cosine_direction, decode_direction, triangle_point};
-use super::surface::{offset_origin, reach_of, surface_at};
+use super::surface::{offset_origin, reach_of, surface_at, surface_of};
 use super::texture::{apply_textures, nearest_visible, share_there};
-use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
+use super::vector::{from_two_floats, to_two_floats, word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
 use crate::layout::{DirectSum, ENVIRONMENT_LIGHT, NO_LIGHT, NO_OBJECT, VisiblePoint};
@@ -80,7 +80,7 @@ fn sample_direct(
         (_, q) => (q, 0.0),
     };
     let leaves = |ray: DVec3| ray.dot(geometric_normal) > 0.0 && ray.dot(shading_normal) > 0.0;
-    let is_free = |direction: DVec3, end: f64, ignored: Option<u32>| {
+    let is_free = |direction: DVec3, end: f64, ignored: Option<PlacedTriangle>| {
         leaves(direction) && nearest_visible(inputs, Ray { origin, direction }, end, ignored, random).is_none()
     };
     // What a unit of irradiance across a direction adds.
@@ -118,7 +118,7 @@ fn sample_direct(
         let Some(hit) = nearest_visible(inputs, Ray { origin, direction }, FAR, None, random) else {
             return sky(environment.at(direction), direction);
         };
-        surface_at(inputs.scene, hit.triangle, hit.u, hit.v)
+        surface_of(inputs.scene, hit)
     } else {
         let light = choose_light(&inputs.scene.lights, choice, [first_digits, second_digits]).light;
         if is_punctual(light) {
@@ -138,9 +138,13 @@ fn sample_direct(
             };
         }
         let (u, v) = triangle_point(u, v);
-        let emitter = surface_at(inputs.scene, light.triangle, u, v);
+        let emitter = surface_at(inputs.scene, PlacedTriangle::unplaced(light.triangle), u, v);
         let direction = emitter.origin_towards(position - emitter.position) - origin;
-        if !is_free(direction, 1.0 - ENDS_BEFORE, Some(light.triangle)) {
+        if !is_free(
+            direction,
+            1.0 - ENDS_BEFORE,
+            Some(PlacedTriangle::unplaced(light.triangle)),
+        ) {
             return DVec3::ZERO;
         }
         emitter
@@ -162,7 +166,7 @@ fn sample_direct(
     if !emits(&emitter.material, cos_light > 0.0) || direction.dot(shading_normal) <= 0.0 || cos_light == 0.0 {
         return DVec3::ZERO;
     }
-    let radiance = there * rgb(emitter.material.emission);
+    let radiance = there * emitted_radiance(&emitter.material, cos_light.abs());
     let density = f64::from(light.probability) * to_light.length_squared() / (f64::from(light.area) * cos_light.abs());
     seen(Sky { radiance, density }, direction)
 }

@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3};
 
 use super::Inputs;
 use super::environment::Environment;
-use super::intersect::Ray;
-use super::light::{Choice, choose_light};
+use super::intersect::{PlacedTriangle, Ray};
+use super::light::{Choice, choose_light, emits, emitted_radiance};
 use super::random::Random;
 use super::sampling::{basis, cosine_direction, disc_point, triangle_point};
 use super::surface::{offset_origin, surface_at};
@@ -20,7 +20,7 @@ pub(super) struct Emission {
     pub ray: Ray,
     pub flux: DVec3,
     /// The triangle that it leaves.
-    pub ignored: Option<u32>,
+    pub ignored: Option<PlacedTriangle>,
     /// Of a punctual light; 0 for one that reaches any distance.
     pub inverse_range: f64,
 }
@@ -75,11 +75,11 @@ fn from_triangle(
     place: DVec2,
     direction: DVec2,
     side: f64,
-) -> (Ray, DVec3, Option<u32>) {
+) -> (Ray, DVec3, Option<PlacedTriangle>) {
     let (u, v) = triangle_point(place.x, place.y);
-    let mut emitter = surface_at(inputs.scene, light.triangle, u, v);
+    let mut emitter = surface_at(inputs.scene, PlacedTriangle::unplaced(light.triangle), u, v);
     apply_textures(inputs.scene, &mut emitter);
-    let both_sides = emitter.material.double_sided != 0;
+    let both_sides = emits(&emitter.material, false);
     let normal = if both_sides && side < 0.5 {
         -emitter.geometric_normal
     } else {
@@ -90,9 +90,9 @@ fn from_triangle(
         origin: offset_origin(emitter.position, normal, emitter.reach),
         direction: cosine_direction(normal, direction.x, direction.y),
     };
-    let flux =
-        rgb(emitter.material.emission) * (PI * sides * f64::from(light.area) * share_there(inputs.scene, &emitter));
-    (ray, flux, Some(light.triangle))
+    let radiance = emitted_radiance(&emitter.material, ray.direction.dot(normal));
+    let flux = radiance * (PI * sides * f64::from(light.area) * share_there(inputs.scene, &emitter));
+    (ray, flux, Some(PlacedTriangle::unplaced(light.triangle)))
 }
 
 /// From a disc across the direction of flight that covers the scene.

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+
 use half::f16;
 
 use super::sampling::{basis, decode_direction, encode_direction};
@@ -14,10 +15,7 @@ pub const SMOOTH_ALPHA: f64 = 1e-3;
 /// Below this α camera paths follow reflections.
 pub(super) const FOLLOWED_ALPHA: f64 = 0.1;
 
-/// In which a byte has a part from 0 to 1: a half is one of them.
-const PART_STEPS: f64 = 254.0;
-
-fn schlick_weight(cosine: f64) -> f64 {
+fn schlick(cosine: f64) -> f64 {
     (1.0 - cosine).clamp(0.0, 1.0).powi(5)
 }
 
@@ -28,12 +26,22 @@ pub struct Reflector {
     pub diffuse: DVec3,
     /// Reflectance of the boundary at normal incidence.
     pub f0: DVec3,
-    /// At grazing incidence, of the part that isn't metal; metal has 1.
-    pub specular: f64,
-    /// Part that is metal and has no base.
-    pub metallic: f64,
+    /// At grazing incidence.
+    pub f90: f64,
+    /// The largest channel of what reflects over the base, at normal and at grazing incidence.
+    pub over_base: [f64; 2],
     /// GGX's α.
     pub alpha: f64,
+    /// What lies above both: how much of a dielectric's reflection it has.
+    pub coat: f64,
+}
+
+/// Reflectance of a clear coat, whose index of refraction is 1.5, at normal incidence.
+pub(super) const COAT_F0: f64 = 0.04;
+
+/// What a coat lets through to what lies below.
+pub fn coat_passes(coat: f64, cosine: f64) -> f64 {
+    1.0 - coat * (COAT_F0 + (1.0 - COAT_F0) * schlick(cosine))
 }
 
 impl Reflector {
@@ -43,9 +51,13 @@ impl Reflector {
         Self {
             diffuse: base * (1.0 - metallic),
             f0: rgb(material.specular_f0).lerp(base, metallic),
-            specular: material.specular_f90.into(),
-            metallic,
+            f90: f64::from(material.specular_f90) * (1.0 - metallic) + metallic,
+            over_base: [
+                rgb(material.specular_f0).max_element(),
+                f64::from(material.specular_f90),
+            ],
             alpha: f64::from(material.roughness).powi(2),
+            coat: f64::from(material.coat),
         }
     }
 
@@ -54,9 +66,10 @@ impl Reflector {
         Self {
             diffuse: albedo,
             f0: DVec3::ZERO,
-            specular: 0.0,
-            metallic: 0.0,
+            f90: 0.0,
+            over_base: [0.0; 2],
             alpha: 0.0,
+            coat: 0.0,
         }
     }
 
@@ -67,47 +80,52 @@ impl Reflector {
 
     /// What a visible point keeps, and the direction to the viewer.
     pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
-        let rest = word(gloss.f0_rest);
-        let [.., metallic, specular] = rest.to_le_bytes();
+        let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
+        let [f0_rg, f0_b_f90, alpha_coat, over_base] = gloss.rest.map(|word| [half(word), half(word >> 16)]);
         let reflector = Self {
             diffuse: xyz(gloss.diffuse_viewer),
-            f0: xyz(gloss.f0_rest),
-            specular: f64::from(specular) / PART_STEPS,
-            metallic: f64::from(metallic) / PART_STEPS,
-            alpha: f16::from_bits(rest as u16).to_f64(),
+            f0: DVec3::new(f0_rg[0], f0_rg[1], f0_b_f90[0]),
+            f90: f0_b_f90[1],
+            over_base,
+            alpha: alpha_coat[0],
+            coat: alpha_coat[1],
         };
         (reflector, decode_direction(word(gloss.diffuse_viewer)))
     }
 
     pub(super) fn to_gloss(self, v: DVec3) -> Gloss {
-        let [low, high] = f16::from_f64(self.alpha).to_bits().to_le_bytes();
-        let [metallic, specular] = [self.metallic, self.specular].map(|part| (part * PART_STEPS + 0.5) as u8);
+        let halves = |[low, high]: [f64; 2]| {
+            let half = |value: f64| u32::from(f16::from_f64(value).to_bits());
+            half(low) | half(high) << 16
+        };
+        let rest = [
+            [self.f0.x, self.f0.y],
+            [self.f0.z, self.f90],
+            [self.alpha, self.coat],
+            self.over_base,
+        ];
         Gloss {
             diffuse_viewer: with_word(self.diffuse, encode_direction(v)),
-            f0_rest: with_word(self.f0, u32::from_le_bytes([low, high, metallic, specular])),
+            rest: rest.map(halves),
         }
     }
 
     /// Reflectance of the boundary.
     pub fn fresnel(&self, cosine: f64) -> DVec3 {
-        let f90 = self.specular + (1.0 - self.specular) * self.metallic;
-        self.f0 + (DVec3::splat(f90) - self.f0) * schlick_weight(cosine)
+        self.f0 + (DVec3::splat(self.f90) - self.f0) * schlick(cosine)
     }
 
     /// What gets through to the base, alike for all colours (`KHR_materials_specular`), and past what isn't metal alone.
     fn through_to_base(&self, cosine: f64) -> f64 {
-        // f0 is a mixture of the metal's colour, of which `diffuse` is what isn't metal, and of what is wanted.
-        let rest = (1.0 - self.metallic).max(1e-3);
-        let over_base = (self.f0 - self.diffuse * (self.metallic / rest)).max_element() / rest;
-        let over_base = over_base.max(0.0);
-        1.0 - (over_base + (self.specular - over_base) * schlick_weight(cosine))
+        let [normal, grazing] = self.over_base;
+        1.0 - (normal + (grazing - normal) * schlick(cosine))
     }
 
     pub(super) fn is_smooth(&self) -> bool {
         self.alpha < SMOOTH_ALPHA
     }
 
-    fn ggx(&self, n: DVec3, h: DVec3) -> f64 {
+    pub(super) fn ggx(&self, n: DVec3, h: DVec3) -> f64 {
         let a2 = self.alpha * self.alpha;
         a2 / (PI * (n.cross(h).length_squared() + a2 * n.dot(h).powi(2)).powi(2))
     }
@@ -125,12 +143,13 @@ impl Reflector {
         }
         let h = (v + l).normalize();
         let f = self.fresnel(v.dot(h));
+        let passes = coat_passes(self.coat, v.dot(h));
         let base = self.through_to_base(v.dot(h)) * self.diffuse / PI;
         if self.is_smooth() {
-            return base;
+            return passes * base;
         }
         let visibility = 0.5 / (nl * self.masking_root(nv) + nv * self.masking_root(nl));
-        base + f * self.ggx(n, h) * visibility
+        passes * (base + f * self.ggx(n, h) * visibility)
     }
 
     /// Share of the samples that go to the boundary's reflection.
@@ -175,12 +194,6 @@ impl Reflector {
         2.0 * cosine / (cosine + self.masking_root(cosine))
     }
 
-    /// Density of [`Self::visible_normal`].
-    pub(super) fn visible_density(&self, n: DVec3, v: DVec3, h: DVec3) -> f64 {
-        let nv = n.dot(v).max(1e-6);
-        self.ggx(n, h) * 2.0 * v.dot(h).max(0.0) / (nv + self.masking_root(nv))
-    }
-
     /// Its density per solid angle.
     pub fn reflected_density(&self, n: DVec3, v: DVec3, l: DVec3) -> f64 {
         let nv = n.dot(v).max(1e-6);
@@ -191,11 +204,12 @@ impl Reflector {
     pub fn reflected_weight(&self, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
         let (nv, nl) = (n.dot(v), n.dot(l));
         if self.is_smooth() {
-            return self.fresnel(nv);
+            return self.fresnel(nv) * coat_passes(self.coat, nv);
         }
         if nl <= 0.0 {
             return DVec3::ZERO;
         }
-        self.fresnel(v.dot((v + l).normalize())) * self.joint_masking(nv, nl)
+        let vh = v.dot((v + l).normalize());
+        self.fresnel(vh) * coat_passes(self.coat, vh) * self.joint_masking(nv, nl)
     }
 }

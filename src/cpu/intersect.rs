@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use super::Inputs;
 use super::vector::{word, xyz};
 use crate::config::Accel;
-use crate::layout::{BvhRecord, LEAF, ShadingTriangle};
+use crate::layout::{BvhRecord, LEAF, PLACEMENT_RECORD};
+use crate::scene::{PackedScene, Placement};
 
 /// The points `origin + t · direction` with t > 0.
 #[derive(Debug, Clone, Copy)]
@@ -16,6 +17,45 @@ pub struct Ray {
     pub origin: DVec3,
     /// Need not be a unit vector.
     pub direction: DVec3,
+}
+
+/// A triangle, and the instance that puts it where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PlacedTriangle {
+    /// Index of the triangle in the order of the BVH's leaves.
+    pub triangle: u32,
+    /// Index of the instance; `None` of one in render space.
+    pub instance: Option<u32>,
+}
+
+impl PlacedTriangle {
+    /// A triangle in render space.
+    pub(super) fn unplaced(triangle: u32) -> Self {
+        Self {
+            triangle,
+            instance: None,
+        }
+    }
+
+    /// Where it is put.
+    pub(super) fn placement(self, scene: &PackedScene) -> Option<Placement> {
+        self.instance.map(|instance| placement(scene, instance))
+    }
+
+    /// Its corners in render space, with the device's roundings.
+    pub(super) fn corners(self, scene: &PackedScene) -> [DVec3; 3] {
+        let triangle = &scene.shading_triangles[self.triangle as usize];
+        let corners = [triangle.p0, triangle.p1, triangle.p2].map(xyz);
+        self.placement(scene).map_or(corners, |placement| {
+            corners.map(|corner| placement.point(corner.as_vec3()).as_dvec3())
+        })
+    }
+}
+
+fn placement(scene: &PackedScene, instance: u32) -> Placement {
+    Placement {
+        rows: scene.instances[instance as usize].rows,
+    }
 }
 
 /// Where a ray meets a triangle.
@@ -27,25 +67,25 @@ pub struct Hit {
     pub u: f64,
     /// Barycentric coordinate of its third corner.
     pub v: f64,
-    /// Index of the triangle in the order of the BVH's leaves.
-    pub triangle: u32,
+    /// Which.
+    pub at: PlacedTriangle,
 }
 
 /// The nearest triangle but `ignored` before t = `limit`.
-pub fn nearest_hit(inputs: &Inputs<'_>, ray: Ray, limit: f64, ignored: Option<u32>) -> Option<Hit> {
+pub fn nearest_hit(inputs: &Inputs<'_>, ray: Ray, limit: f64, ignored: Option<PlacedTriangle>) -> Option<Hit> {
     Search::new(inputs, ray, limit, ignored, false).run(inputs)
 }
 
 /// Whether any triangle but `ignored` lies before t = `limit`.
-pub fn is_blocked(inputs: &Inputs<'_>, ray: Ray, limit: f64, ignored: Option<u32>) -> bool {
+pub fn is_blocked(inputs: &Inputs<'_>, ray: Ray, limit: f64, ignored: Option<PlacedTriangle>) -> bool {
     Search::new(inputs, ray, limit, ignored, true).run(inputs).is_some()
 }
 
 /// A search for the nearest or for any hit.
 struct Search<'a> {
-    triangles: &'a [ShadingTriangle],
+    scene: &'a PackedScene,
     ray: Ray,
-    ignored: Option<u32>,
+    ignored: Option<PlacedTriangle>,
     any: bool,
     /// t of the nearest hit so far.
     limit: f64,
@@ -53,9 +93,9 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(inputs: &Inputs<'a>, ray: Ray, limit: f64, ignored: Option<u32>, any: bool) -> Self {
+    fn new(inputs: &Inputs<'a>, ray: Ray, limit: f64, ignored: Option<PlacedTriangle>, any: bool) -> Self {
         Self {
-            triangles: &inputs.scene.shading_triangles,
+            scene: inputs.scene,
             ray,
             ignored,
             any,
@@ -66,8 +106,14 @@ impl<'a> Search<'a> {
 
     fn run(mut self, inputs: &Inputs<'_>) -> Option<Hit> {
         match inputs.config.accel {
-            Accel::Brute => self.test(0..self.triangles.len() as u32),
-            Accel::Bvh => self.traverse(&inputs.scene.bvh),
+            Accel::Brute => {
+                self.test(0..self.scene.own_triangles, None);
+                for (index, instance) in (0..).zip(&self.scene.instances) {
+                    let first = instance.first_triangle;
+                    self.test(first..first + instance.triangle_count, Some(index));
+                }
+            }
+            Accel::Bvh => self.traverse(&self.scene.bvh, 0, None),
         }
         self.hit
     }
@@ -76,42 +122,51 @@ impl<'a> Search<'a> {
         self.any && self.hit.is_some()
     }
 
-    fn test(&mut self, triangles: Range<u32>) {
-        for index in triangles {
-            if self.ignored == Some(index) || self.is_over() {
+    fn test(&mut self, triangles: Range<u32>, instance: Option<u32>) {
+        for triangle in triangles {
+            let at = PlacedTriangle { triangle, instance };
+            if self.ignored == Some(at) || self.is_over() {
                 continue;
             }
-            let triangle = &self.triangles[index as usize];
-            let corners = [triangle.p0, triangle.p1, triangle.p2].map(xyz);
-            if let Some((t, u, v)) = intersect_triangle(self.ray, corners)
+            if let Some((t, u, v)) = intersect_triangle(self.ray, at.corners(self.scene))
                 && t < self.limit
             {
                 self.limit = t;
-                self.hit = Some(Hit {
-                    t,
-                    u,
-                    v,
-                    triangle: index,
-                });
+                self.hit = Some(Hit { t, u, v, at });
             }
         }
     }
 
-    fn traverse(&mut self, records: &[BvhRecord]) {
+    /// Goes through the hierarchy below a root, which an instance puts somewhere.
+    fn traverse(&mut self, records: &[BvhRecord], root: u32, instance: Option<Entered>) {
+        let to_local = instance.map_or(DAffine3::IDENTITY, |entered| entered.to_local);
+        let wider = instance.map_or(0.0, |entered| entered.widening);
+        let origin = to_local.transform_point3(self.ray.origin);
         // A component of 0 gives infinite slabs; ±1e-20 keeps 0 · ∞ out of them.
         let safe = |d: f64| if d.abs() < 1e-20 { 1e-20 } else { d };
-        let inverse = self.ray.direction.map(safe).recip();
+        let inverse = to_local.transform_vector3(self.ray.direction).map(safe).recip();
         let mut stack = Vec::with_capacity(64);
-        stack.push((0, 0.0));
+        stack.push((root, 0.0));
         while let Some((reference, enter)) = stack.pop() {
             if enter > self.limit || self.is_over() {
                 continue;
             }
             if reference & LEAF != 0 {
-                self.test(leaf(records, reference));
+                let first = (reference & !LEAF) as usize;
+                if records[first].row3[2].to_bits() == PLACEMENT_RECORD {
+                    let entered = Entered::new(self.scene, &records[first], &records[first + 1]);
+                    self.traverse(records, records[first + 1].row3[0].to_bits(), Some(entered));
+                } else {
+                    self.test(leaf(records, reference), instance.map(|entered| entered.index));
+                }
                 continue;
             }
-            let [left, right] = children(&records[reference as usize], self.ray.origin, inverse, self.limit);
+            let [left, right] = children(
+                &records[reference as usize],
+                [origin + wider, origin - wider],
+                inverse,
+                self.limit,
+            );
             let left_first = match (left, right) {
                 (Some((_, left)), Some((_, right))) => left <= right,
                 _ => true,
@@ -119,6 +174,27 @@ impl<'a> Search<'a> {
             let (first, second) = if left_first { (left, right) } else { (right, left) };
             stack.extend(second);
             stack.extend(first);
+        }
+    }
+}
+
+/// An instance that a ray has entered.
+#[derive(Clone, Copy)]
+struct Entered {
+    index: u32,
+    to_local: DAffine3,
+    /// What boxes are widened by, since the corners are rounded where they are put.
+    widening: f64,
+}
+
+impl Entered {
+    /// By its two records.
+    fn new(scene: &PackedScene, to_render: &BvhRecord, ray: &BvhRecord) -> Self {
+        let index = to_render.row3[0].to_bits();
+        Self {
+            index,
+            to_local: placement(scene, index).map().inverse(),
+            widening: ray.row3[3].into(),
         }
     }
 }
@@ -131,10 +207,11 @@ fn leaf(records: &[BvhRecord], reference: u32) -> Range<u32> {
     first..first + 1 + others.unwrap_or(0) as u32
 }
 
-/// The references to those children of a node whose boxes the ray enters before `limit`, and t at the entry.
-fn children(node: &BvhRecord, origin: DVec3, inverse: DVec3, limit: f64) -> [Option<(u32, f64)>; 2] {
+/// The references to those children of a node whose boxes the ray enters before `limit`, and t at the entry. The origin is
+/// given as the boxes' lower and as their upper corners see it.
+fn children(node: &BvhRecord, [low, high]: [DVec3; 2], inverse: DVec3, limit: f64) -> [Option<(u32, f64)>; 2] {
     [(node.row0, node.row1), (node.row2, node.row3)].map(|(min, max)| {
-        let (t0, t1) = ((xyz(min) - origin) * inverse, (xyz(max) - origin) * inverse);
+        let (t0, t1) = ((xyz(min) - low) * inverse, (xyz(max) - high) * inverse);
         let enter = t0.min(t1).max_element().max(0.0);
         // The factor covers the rounding of the slab test: Ize, «Robust BVH Ray Traversal», JCGT 2(2), 2013.
         let leave = t0.max(t1).min_element().min(limit) * (1.0 + 4.0 * f64::EPSILON);

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
+use super::gloss::coat_passes;
 use super::vector::rgb;
-use crate::layout::{DIRECTIONAL_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT};
+use crate::layout::{BACK_EMITS, DIRECTIONAL_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT};
 
 /// A light, and what is left of the number that chose it, uniform in [0, 1].
 pub(super) struct Choice<'a> {
@@ -33,7 +34,12 @@ pub(super) fn choose_light(lights: &[Light], u: f64, digits: [f64; 2]) -> Choice
 
 /// Whether light leaves on the triangle's front, or on its back.
 pub(super) fn emits(material: &Material, front: bool) -> bool {
-    front || material.double_sided != 0
+    front || material.sides & BACK_EMITS != 0
+}
+
+/// Radiance at this cosine to the normal: a coat lies on lamps too.
+pub(super) fn emitted_radiance(material: &Material, cosine: f64) -> DVec3 {
+    coat_passes(f64::from(material.coat), cosine) * rgb(material.emission)
 }
 
 /// Whether it has no extent.

@@ -9,6 +9,7 @@
 //! Every function gives the same bits whatever the number of threads: paths are dealt to lanes, not to threads, and no
 //! sum depends on an order.
 
+mod boundary;
 mod camera;
 mod contact;
 mod coverage;
@@ -17,6 +18,7 @@ mod dispersion;
 mod emission;
 mod environment;
 mod gather;
+mod glint;
 mod gloss;
 mod intersect;
 mod light;
@@ -40,7 +42,7 @@ pub use coverage::coverage;
 pub use direct::direct;
 pub use gather::{gather_kd_tree, gather_naive};
 pub use gloss::Reflector;
-pub use intersect::{Hit, Ray, is_blocked, nearest_hit};
+pub use intersect::{Hit, PlacedTriangle, Ray, is_blocked, nearest_hit};
 pub use photons::{Batch, compact, photons};
 pub use primitives::{scan, sort};
 pub use random::{PathKind, Random, pcg4d};

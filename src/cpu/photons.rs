@@ -3,20 +3,21 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::boundary::Boundary;
 use super::contact::{Encounter, choose_part, transmittance};
 use super::dispersion::disperse;
 use super::emission::emit;
-use super::gloss::Reflector;
-use super::intersect::Ray;
+use super::gloss::{FOLLOWED_ALPHA, Reflector};
+use super::intersect::{PlacedTriangle, Ray};
 use super::light::range_window;
 use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction};
-use super::surface::{Boundary, GLOSSY, MATTE, MIRROR};
+use super::surface::{GLOSSY, MATTE, MIRROR};
 use super::texture::{nearest_visible, share_there};
 use super::vector::{rgb, with_word};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
-use crate::layout::Photon;
+use crate::layout::{Material, Photon};
 
 /// Photon paths that are followed together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,7 +52,7 @@ pub fn compact(lanes: &[Vec<Photon>]) -> Vec<Photon> {
 struct Path {
     ray: Ray,
     flux: DVec3,
-    ignored: Option<u32>,
+    ignored: Option<PlacedTriangle>,
     /// Material that it is in.
     medium: Option<u32>,
     /// Of its light, nm.
@@ -97,7 +98,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         };
         let incoming = path.ray.direction;
         let met = Encounter::new(inputs, hit, incoming, path.medium);
-        let (surface, facing) = (met.surface, met.facing);
+        let (surface, mut facing) = (met.surface, met.facing);
         let mut material = surface.material;
         path.flux *= transmittance(inputs, met.through, hit.t);
         // A range is how far the light itself reaches, not what it lights.
@@ -107,15 +108,13 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         }
         let mut u = random.next4();
         let (mixed, rest) = choose_part(&mut material, u[3]);
-        let kind = material.surface;
         u[3] = rest;
         let [choice, second, survival, _] = u;
-        let scatters = [MATTE, GLOSSY].contains(&kind);
+        let scatters = |material: &Material| [MATTE, GLOSSY].contains(&material.surface);
+        let wide_coat = material.coat > 0.0 && f64::from(material.coat_roughness).powi(2) >= FOLLOWED_ALPHA;
         let mut landing = path.flux;
-        if mixed || scatters {
-            // Flux is per area of the geometric surface, scattering per cosine to the shading normal: Veach, «Robust
-            // Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
-            landing *= incoming.dot(facing.shading_normal) / incoming.dot(facing.geometric_normal);
+        if mixed || wide_coat || scatters(&material) {
+            landing *= facing.landing_correction(incoming);
             if !landing.is_finite() {
                 counts.add_non_finite(1);
                 return;
@@ -131,8 +130,15 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
                 });
             }
         }
+        let mut layer = 1.0;
+        if material.coat > 0.0 {
+            let [u, ..] = random.next4();
+            layer = facing.choose_layer(&mut material, surface.coat_normal, incoming, u);
+            landing = path.flux * layer * facing.landing_correction(incoming);
+        }
+        let kind = material.surface;
         let (mut medium, mut wavelength) = (path.medium, path.wavelength);
-        let (direction, flux) = if scatters {
+        let (direction, flux) = if scatters(&material) {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             let outgoing = cosine_direction(facing.geometric_normal, choice, second);
             let (outgoing, weight) = if kind == GLOSSY {
@@ -146,7 +152,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
                 scattered.filter(|_| outgoing.dot(facing.shading_normal) > 0.0),
             )
         } else if kind == MIRROR {
-            let reflected = path.flux * facing.mirror_reflectance(material.base_color, incoming);
+            let reflected = path.flux * layer * facing.mirror_reflectance(&material, incoming);
             (facing.reflect(incoming), roulette(path.flux, reflected, survival))
         } else {
             path.flux *= disperse(&mut material, &mut wavelength, &mut random);
@@ -155,10 +161,10 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
                 Some(refracted) if choice >= boundary.reflectance => {
                     (refracted, met.tint * boundary.refracted_weight, met.beyond)
                 }
-                _ => (boundary.reflected, DVec3::splat(boundary.reflected_weight), met.through),
+                _ => (boundary.reflected, boundary.reflected_weight, met.through),
             };
             medium = side;
-            (direction, roulette(path.flux, path.flux * weight, survival))
+            (direction, roulette(path.flux, path.flux * layer * weight, survival))
         };
         let Some(flux) = flux else { return };
         path = Path {

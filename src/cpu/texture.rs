@@ -4,10 +4,10 @@ use glam::{DVec2, DVec3, DVec4};
 use half::f16;
 
 use super::Inputs;
-use super::intersect::{Hit, Ray, nearest_hit};
+use super::intersect::{Hit, PlacedTriangle, Ray, nearest_hit};
 use super::random::Random;
 use super::sampling::decode_direction;
-use super::surface::{Surface, surface_at};
+use super::surface::{Surface, surface_of};
 use super::vector::rgb;
 use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED};
 use crate::scene::PackedScene;
@@ -21,13 +21,14 @@ struct Place {
 }
 
 impl Place {
-    fn of(scene: &PackedScene, triangle: u32, [u, v]: [f64; 2]) -> Self {
+    fn of(scene: &PackedScene, at: PlacedTriangle, [u, v]: [f64; 2]) -> Self {
         let mut place = Self {
             sets: [DVec2::ZERO; 2],
             color: DVec4::ZERO,
             tangent: DVec4::ZERO,
         };
-        let corners = &scene.corners[3 * triangle as usize..][..3];
+        let placement = at.placement(scene);
+        let corners = &scene.corners[3 * at.triangle as usize..][..3];
         for (corner, weight) in corners.iter().zip([1.0 - u - v, u, v]) {
             let half = |word: u32| f64::from(f16::from_bits(word as u16));
             let [low, high] = corner.color;
@@ -35,8 +36,14 @@ impl Place {
             place.sets[0] += weight * DVec2::from(corner.first.map(f64::from));
             place.sets[1] += weight * DVec2::from(corner.second.map(f64::from));
             place.color += weight * DVec4::from(color);
-            let side = f64::from(corner.bitangent);
-            place.tangent += weight * (decode_direction(corner.tangent) * side.abs()).extend(side);
+            let mut side = f64::from(corner.bitangent);
+            let mut tangent = decode_direction(corner.tangent);
+            if let Some(placement) = placement {
+                // It follows the surface as its edges do. Mirroring turns normal × tangent round, but not the bitangent.
+                tangent = placement.map().transform_vector3(tangent).normalize();
+                side = if placement.is_mirrored() { -side } else { side };
+            }
+            place.tangent += weight * (tangent * side.abs()).extend(side);
         }
         place
     }
@@ -78,13 +85,24 @@ pub(super) fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
         material.specular_f0 = times(material.specular_f0, value.truncate());
     }
     if let Some(value) = at(textures.normal_texture) {
-        surface.shading_normal = leaning_normal(surface, &place, value.truncate(), textures.normal_scale.into());
+        let scale = textures.normal_scale.into();
+        surface.shading_normal = leaning_normal(surface.shading_normal, surface, &place, value.truncate(), scale);
+    }
+    let material = &mut surface.material;
+    if let Some(value) = at(textures.coat_texture) {
+        material.coat *= value.x as f32;
+    }
+    if let Some(value) = at(textures.coat_roughness_texture) {
+        material.coat_roughness *= value.y as f32;
+    }
+    if let Some(value) = at(textures.coat_normal_texture) {
+        let scale = textures.coat_normal_scale.into();
+        surface.coat_normal = leaning_normal(surface.coat_normal, surface, &place, value.truncate(), scale);
     }
 }
 
-/// The normal that a texture leans to, on the side of the geometric one.
-fn leaning_normal(surface: &Surface, place: &Place, value: DVec3, scale: f64) -> DVec3 {
-    let n = surface.shading_normal;
+/// The normal that a texture leans `n` to, on the side of the geometric one.
+fn leaning_normal(n: DVec3, surface: &Surface, place: &Place, value: DVec3, scale: f64) -> DVec3 {
     let t = place.tangent.truncate();
     let t = t - t.dot(n) * n;
     if t.length_squared() < 1e-12 || place.tangent.w == 0.0 {
@@ -124,7 +142,7 @@ pub(super) fn nearest_visible(
     inputs: &Inputs<'_>,
     ray: Ray,
     t_max: f64,
-    ignored: Option<u32>,
+    ignored: Option<PlacedTriangle>,
     random: &Random,
 ) -> Option<Hit> {
     let mut hit = nearest_hit(inputs, ray, t_max, ignored)?;
@@ -133,7 +151,7 @@ pub(super) fn nearest_visible(
     }
     let mut passed = 0.0;
     for number in 0.. {
-        let met = surface_at(inputs.scene, hit.triangle, hit.u, hit.v);
+        let met = surface_of(inputs.scene, hit);
         if random.of_passage(number) < share_there(inputs.scene, &met) {
             break;
         }
@@ -143,7 +161,7 @@ pub(super) fn nearest_visible(
             ..ray
         };
         passed = (behind.origin - ray.origin).dot(ray.direction) / ray.direction.length_squared();
-        hit = nearest_hit(inputs, behind, t_max - passed, Some(hit.triangle))?;
+        hit = nearest_hit(inputs, behind, t_max - passed, Some(hit.at))?;
     }
     hit.t += passed;
     Some(hit)

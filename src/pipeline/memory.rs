@@ -63,7 +63,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
 }
 
 /// The buffers that hold the scene.
-pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 10] {
+pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 11] {
     [
         (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
         (BufferId::HavelTriangles, bytemuck::cast_slice(&scene.havel_triangles)),
@@ -71,6 +71,7 @@ pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 10] {
             BufferId::ShadingTriangles,
             bytemuck::cast_slice(&scene.shading_triangles),
         ),
+        (BufferId::Instances, bytemuck::cast_slice(&scene.instances)),
         (BufferId::Materials, bytemuck::cast_slice(&scene.materials)),
         (BufferId::Corners, bytemuck::cast_slice(&scene.corners)),
         (BufferId::Textures, bytemuck::cast_slice(&scene.textures)),

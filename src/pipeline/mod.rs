@@ -77,8 +77,8 @@ impl Renderer {
             storage_buffer_bytes: buffer_bytes,
             ..limits(device.summary(), device.loop_limit(), scene)
         };
-        let triangles = scene.shading_triangles.len() as u32;
-        if config.accel == Accel::Brute && triangles > limits.loop_limit {
+        let triangles = scene.seen_triangles();
+        if config.accel == Accel::Brute && triangles > u64::from(limits.loop_limit) {
             return Err(Error::Device(format!(
                 "--accel brute: device {} ends loops early, and the scene has {triangles} triangles; use --accel bvh or \
                  another --device",

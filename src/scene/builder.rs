@@ -1,5 +1,7 @@
 //! Collects triangles in render space.
 
+use std::collections::HashMap;
+
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use gltf::json::Root;
 
@@ -7,6 +9,7 @@ use super::attributes::NotFinite;
 use super::diagnostic::Check;
 use super::facet::{face_normal, spans_area};
 use super::instance::{Corner, Instance, WorldTriangle};
+use super::sharing::{Placed, Shared};
 use super::{Normalisation, Object, Triangle};
 
 /// Mark of a vertex that no triangle has used yet.
@@ -34,6 +37,10 @@ pub(super) struct Builder {
     pub zero_normals: usize,
     /// Texture coordinates, colours and tangents that weren't finite and were left out.
     pub not_finite: usize,
+    /// Whether instances share triangles.
+    pub shares: bool,
+    /// Triangles that they share, by mesh and primitive.
+    pub shared: HashMap<(usize, usize), Shared>,
     /// For each vertex of the primitive in hand, its index in the scene, or [`UNSEEN`]. Kept between primitives, and
     /// cleared only where it was written: many primitives may use small parts of one large accessor.
     scene_vertices: Vec<u32>,
@@ -43,7 +50,7 @@ pub(super) struct Builder {
 
 impl Builder {
     /// A builder that has no objects yet.
-    pub(super) fn new(normalisation: Normalisation) -> Self {
+    pub(super) fn new(normalisation: Normalisation, shares: bool) -> Self {
         Self {
             geometry: Geometry {
                 positions: Vec::new(),
@@ -58,6 +65,8 @@ impl Builder {
             },
             zero_normals: 0,
             not_finite: 0,
+            shares,
+            shared: HashMap::new(),
             scene_vertices: Vec::new(),
             seen: Vec::new(),
         }
@@ -65,17 +74,43 @@ impl Builder {
 
     /// Adds an instance as an object, unless nothing of it is left. Returns how many triangles were dropped.
     pub(super) fn add(&mut self, root: &Root, instance: &Instance<'_>) -> Check<usize> {
+        let object = |triangles, placement| Object {
+            name: instance.name(root),
+            material: instance.primitive.material as u32,
+            triangles,
+            placement,
+        };
+        let shared = self.share(root, instance)?;
+        let (object, dropped) = if let Some(Placed {
+            triangles,
+            placement,
+            dropped,
+        }) = shared
+        {
+            (object(triangles, Some(placement)), dropped)
+        } else {
+            let first = self.geometry.triangles.len() as u32;
+            let index = self.geometry.objects.len() as u32;
+            let dropped = self.add_triangles(instance, self.geometry.normalisation, index)?;
+            (object(first..self.geometry.triangles.len() as u32, None), dropped)
+        };
+        self.geometry.dropped_triangles += dropped;
+        if !object.triangles.is_empty() {
+            self.geometry.objects.push(object);
+        }
+        Ok(dropped)
+    }
+
+    /// Adds the triangles of an object in a space. Returns how many were dropped.
+    pub(super) fn add_triangles(&mut self, instance: &Instance<'_>, space: Normalisation, object: u32) -> Check<usize> {
         let primitive = &instance.primitive;
-        let first = self.geometry.triangles.len();
-        let object = self.geometry.objects.len() as u32;
         let mut dropped = 0;
         if self.scene_vertices.len() < primitive.attributes.len() {
             self.scene_vertices.resize(primitive.attributes.len(), UNSEEN);
         }
         for triangle in 0..primitive.triangle_count() {
             let WorldTriangle { corners, positions } = instance.triangle(triangle)?;
-            let normalisation = self.geometry.normalisation;
-            let rounded = positions.map(|position| normalisation.to_render(position));
+            let rounded = positions.map(|position| space.to_render(position));
             let Some(face_normal) = face_normal(positions).filter(|_| spans_area(rounded)) else {
                 dropped += 1;
                 continue;
@@ -91,15 +126,6 @@ impl Builder {
         }
         for vertex in self.seen.drain(..) {
             self.scene_vertices[vertex] = UNSEEN;
-        }
-        self.geometry.dropped_triangles += dropped;
-        let last = self.geometry.triangles.len();
-        if last > first {
-            self.geometry.objects.push(Object {
-                name: instance.name(root),
-                material: primitive.material as u32,
-                triangles: first as u32..last as u32,
-            });
         }
         Ok(dropped)
     }

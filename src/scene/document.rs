@@ -13,12 +13,13 @@ use serde::Deserialize;
 
 use super::buffer::{self, slice};
 use super::diagnostic::{Check, damaged, quote};
-use super::{glb, meshopt};
+use super::{coat, glb, meshopt};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
 pub(super) const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_lights_punctual",
+    coat::EXTENSION,
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",

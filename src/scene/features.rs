@@ -1,8 +1,8 @@
 //! What of the renderer a scene needs: the kernels are specialised for it and have no code for the rest.
 
 use crate::layout::{
-    DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH, SPOT_LIGHT,
-    ShadingTriangle, TEXTURED, TOUCHED,
+    BACK_HIDDEN, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH,
+    SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED,
 };
 
 /// [`Material::surface`] of a mirror.
@@ -68,6 +68,14 @@ features! {
     textured: "TEXTURED",
     /// Surfaces that aren't there everywhere.
     alpha: "ALPHA",
+    /// Clear coats.
+    coat: "CLEARCOAT",
+    /// Dielectrics that reflect more or less than their index says.
+    specular_glass: "SPECULAR_GLASS",
+    /// Surfaces whose back no camera sees.
+    culling: "CULLING",
+    /// Instances that share triangles.
+    instanced: "INSTANCED",
     /// A lens before the camera that is rendered.
     lens: "LENS",
 }
@@ -84,12 +92,15 @@ impl SceneFeatures {
             let mixed = glass && !(clear && material.metallic == 0.0);
             features.mirror |= material.surface == MIRROR;
             features.dielectric |= glass;
-            features.glossy |= material.surface == GLOSSY || mixed;
+            features.glossy |= material.surface == GLOSSY || mixed || material.coat > 0.0;
             features.rough_glass |= glass && material.roughness > 0.0;
             features.thin_walls |= glass && material.thin != 0;
             features.partly_clear |= mixed;
             features.absorption |= glass && material.absorption != [0.0; 3];
             features.dispersion |= glass && material.dispersion > 0.0;
+            features.culling |= material.sides & BACK_HIDDEN != 0;
+            features.coat |= material.coat > 0.0;
+            features.specular_glass |= glass && is_changed(material);
             features.textured |= triangle.flags & TEXTURED != 0;
             features.alpha |= triangle.flags & SEE_THROUGH != 0;
             features.contact |= triangle.flags & TOUCHED != 0;
@@ -111,6 +122,14 @@ impl SceneFeatures {
         let present = self.constants().into_iter().filter(|(_, present)| *present);
         present.map(|(name, _)| Self::spell(name)).collect()
     }
+}
+
+/// Whether a dielectric reflects another part of the light than its index says: KHR_materials_specular.
+fn is_changed(glass: &Material) -> bool {
+    let textures = [glass.specular_texture, glass.specular_color_texture];
+    let of_ior = ((glass.ior - 1.0) / (glass.ior + 1.0)).powi(2);
+    let is_other = |f0: &f32| (f0 - of_ior).abs() > 1e-6 * of_ior;
+    textures != [NO_TEXTURE; 2] || glass.specular_f90 != 1.0 || glass.specular_f0.iter().any(is_other)
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ use super::graph::{PlacedNode, node_label};
 use super::instance::Instance;
 use super::morph;
 use super::primitive::{Primitive, primitive_label};
+use super::sharing;
 use super::skin::Skins;
 
 /// The most triangles that a scene may have. A few hundred bytes of instances of instances could ask for any number.
@@ -117,7 +118,7 @@ pub(super) fn instances<'a>(
 /// Builds the triangles of all instances in render space, without those that have no area.
 pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut Warnings) -> Check<Geometry> {
     let normalisation = normalise(root, instances)?;
-    let mut builder = Builder::new(normalisation);
+    let mut builder = Builder::new(normalisation, sharing::is_worth_it(root, instances));
     let mut dropped = Vec::new();
     for instance in instances {
         let count = builder
@@ -158,20 +159,43 @@ pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut W
 }
 
 /// Finds render space from the bounds of all triangles that have an area.
-fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
+pub(super) fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
     let mut lower = DVec3::INFINITY;
     let mut upper = DVec3::NEG_INFINITY;
+    let mut repeated = HashMap::new();
     for instance in instances {
-        for triangle in 0..instance.primitive.triangle_count() {
-            let positions = instance
-                .triangle(triangle)
-                .map_err(|what| format!("{}: {what}", instance.label(root)))?
-                .positions;
-            if face_normal(positions).is_some() {
+        let mut extend = |positions: [DVec3; 3]| {
+            let is_inside = |corner: DVec3| corner.cmpge(lower).all() && corner.cmple(upper).all();
+            if !positions.iter().all(|&corner| is_inside(corner)) && face_normal(positions).is_some() {
                 for corner in positions {
                     lower = lower.min(corner);
                     upper = upper.max(corner);
                 }
+            }
+        };
+        let at_label = |what| format!("{}: {what}", instance.label(root));
+        let triangles = 0..instance.primitive.triangle_count();
+        let Some(to_world) = instance.node_alone().filter(|_| instance.is_repeated()) else {
+            for triangle in triangles {
+                extend(instance.triangle(triangle).map_err(at_label)?.positions);
+            }
+            continue;
+        };
+        // Read once, whatever the number of nodes.
+        let unplaced: &mut Vec<[DVec3; 3]> = match repeated.entry(instance.key()) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let unplaced = instance.unplaced();
+                let read = triangles.map(|triangle| Ok(unplaced.triangle(triangle)?.positions));
+                entry.insert(read.collect::<Check<_>>().map_err(at_label)?)
+            }
+        };
+        for (triangle, positions) in unplaced.iter().enumerate() {
+            let positions = positions.map(|corner| to_world.transform_point3(corner));
+            if positions.iter().all(|corner| corner.is_finite()) {
+                extend(positions);
+            } else {
+                instance.triangle(triangle).map_err(at_label)?;
             }
         }
     }

@@ -13,6 +13,7 @@ use super::primitive::{Primitive, primitive_label};
 use super::skin::JointMatrices;
 
 /// A primitive, and where a node puts it.
+#[derive(Clone)]
 pub(super) struct Instance<'a> {
     node: &'a PlacedNode<'a>,
     mesh: usize,
@@ -24,6 +25,7 @@ pub(super) struct Instance<'a> {
     placement: Placement,
 }
 
+#[derive(Clone)]
 enum Placement {
     Node(Map),
     Skin(JointMatrices),
@@ -89,6 +91,32 @@ impl<'a> Instance<'a> {
             primitive,
             morph,
             placement,
+        }
+    }
+
+    /// Mesh and primitive.
+    pub(super) fn key(&self) -> (usize, usize) {
+        (self.mesh, self.primitive_index)
+    }
+
+    /// Whether other nodes show the primitive as well.
+    pub(super) fn is_repeated(&self) -> bool {
+        Rc::strong_count(&self.primitive) > 1
+    }
+
+    /// Where it is in the world if only its node puts it there: no skin and no morph target.
+    pub(super) fn node_alone(&self) -> Option<DAffine3> {
+        match &self.placement {
+            Placement::Node(map) if self.morph.is_empty() => Some(map.to_world),
+            _ => None,
+        }
+    }
+
+    /// The same in the mesh's space.
+    pub(super) fn unplaced(&self) -> Self {
+        Self {
+            placement: Placement::Node(Map::new(DAffine3::IDENTITY)),
+            ..self.clone()
         }
     }
 

@@ -47,7 +47,7 @@ impl Scene {
         self.objects.iter().filter_map(|object| {
             let material = &self.materials[object.material as usize];
             let radiance = material.emission.as_dvec3().element_sum() / 3.0;
-            let sides = if material.double_sided { 2.0 } else { 1.0 };
+            let sides = if material.back_emits { 2.0 } else { 1.0 };
             (radiance > 0.0 && !material.unlit).then_some((object, radiance * PI * sides))
         })
     }

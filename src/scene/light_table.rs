@@ -75,7 +75,7 @@ pub(crate) fn set_alias_table(lights: &mut [Light], probabilities: &[f64]) {
 }
 
 fn emissive_triangles(scene: &Scene, order: &[u32]) -> Vec<Candidate> {
-    let mut place = vec![0; order.len()];
+    let mut place = vec![0; scene.triangles.len()];
     for (packed, &index) in order.iter().enumerate() {
         place[index as usize] = packed as u32;
     }
@@ -144,7 +144,7 @@ fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
 /// Centre and area of a disc before the scene from which parallel rays meet all of it.
 fn disc_across(scene: &Scene, direction: DVec3) -> (DVec3, f64) {
     let (mut before, mut radius2): (f64, f64) = (0.0, 0.0);
-    for position in scene.positions.iter().map(|position| position.as_dvec3()) {
+    for position in scene.corners().map(Vec3::as_dvec3) {
         let along = position.dot(direction);
         before = before.max(-along);
         radius2 = radius2.max((position - along * direction).length_squared());
@@ -156,7 +156,7 @@ fn disc_across(scene: &Scene, direction: DVec3) -> (DVec3, f64) {
 
 /// Radius of a sphere around the origin that holds the scene.
 fn bounding_radius(scene: &Scene) -> f64 {
-    let radius2 = scene.positions.iter().copied().map(Vec3::length_squared);
+    let radius2 = scene.corners().map(Vec3::length_squared);
     f64::from(radius2.fold(0.0, f32::max)).sqrt() * MARGIN
 }
 

@@ -3,13 +3,14 @@
 use glam::Vec3;
 use gltf::json;
 use gltf::json::extensions::material::Volume;
-use gltf::json::material::AlphaMode;
+use gltf::json::material::{AlphaMode, NormalTexture};
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 
+use super::coat::{self, Clearcoat};
 use super::diagnostic::{Check, Warnings, damaged, label, shorten};
 use super::texture::{TextureReader, TextureUse};
-use super::{Alpha, Dielectric, Gloss, Material, MaterialTextures, Surface};
+use super::{Alpha, Coat, Dielectric, Gloss, Material, MaterialTextures, Surface};
 
 /// Index of refraction where the file gives none.
 const DEFAULT_IOR: f32 = 1.5;
@@ -68,11 +69,12 @@ impl Reader<'_> {
         let [alpha] = self.fractions("alpha of its baseColorFactor", [alpha])?;
         let base_color = self.fractions("baseColorFactor", [red, green, blue])?;
         let unlit = self.extension(|extensions| extensions.unlit.as_ref()).is_some();
-        let (surface, emission) = (self.surface()?, self.emission()?);
-        let (surface, base_color, emission) = if unlit {
-            (Surface::Matte, Vec3::ZERO, base_color.into())
+        let coat = self.coat()?;
+        let (surface, emission) = (self.surface(coat.factor > 0.0)?, self.emission()?);
+        let (surface, coat, base_color, emission) = if unlit {
+            (Surface::Matte, Coat::default(), Vec3::ZERO, base_color.into())
         } else {
-            (surface, base_color.into(), emission)
+            (surface, coat, base_color.into(), emission)
         };
         Ok(Material {
             name: match &self.json.name {
@@ -80,9 +82,12 @@ impl Reader<'_> {
                 None => format!("material {index}"),
             },
             surface,
+            coat,
             base_color,
             emission,
-            double_sided: self.json.double_sided || unlit,
+            back_emits: self.json.double_sided || unlit,
+            // Glass has an inside to be seen from.
+            back_hidden: !self.json.double_sided && !matches!(surface, Surface::Dielectric(_)),
             unlit,
             alpha: match self.json.alpha_mode {
                 Checked::Valid(AlphaMode::Opaque) => Alpha::Opaque,
@@ -98,7 +103,7 @@ impl Reader<'_> {
     }
 
     /// A metal is a metal even where it claims to transmit: glTF mixes the two lobes by metallicFactor first.
-    fn surface(&mut self) -> Check<Surface> {
+    fn surface(&mut self, coated: bool) -> Check<Surface> {
         let pbr = &self.json.pbr_metallic_roughness;
         let [metallic] = self.fractions("metallicFactor", [pbr.metallic_factor.0])?;
         let [roughness] = self.fractions("roughnessFactor", [pbr.roughness_factor.0])?;
@@ -119,7 +124,7 @@ impl Reader<'_> {
             return Ok(Surface::Mirror);
         }
         let is_clear = transmission > 0.0 && !all_metal;
-        if !is_clear && metallic == 0.0 && specular == 0.0 {
+        if !is_clear && metallic == 0.0 && specular == 0.0 && !coated {
             return Ok(Surface::Matte);
         }
         // KHR_materials_ior and KHR_materials_specular.
@@ -133,7 +138,8 @@ impl Reader<'_> {
         if !is_clear {
             return Ok(Surface::Glossy(gloss));
         }
-        self.warn_of_glass();
+        // Where all is reflected, nothing is bent.
+        let ior = if ior == 0.0 { DEFAULT_IOR } else { ior };
         let volume = self.extension(|extensions| extensions.volume.as_ref());
         let thin = volume.is_none_or(|volume| volume.thickness_factor.0 == 0.0);
         Ok(Surface::Dielectric(Dielectric {
@@ -148,16 +154,11 @@ impl Reader<'_> {
         }))
     }
 
-    fn ior(&mut self) -> Check<f32> {
+    /// 0 stands for infinity.
+    fn ior(&self) -> Check<f32> {
         let ior = self.extension(|extensions| extensions.ior.as_ref());
         let ior = ior.map_or(DEFAULT_IOR, |ior| ior.ior.0);
-        if ior == 0.0 {
-            self.warn(format!(
-                "an index of refraction of 0 (total reflection) isn't supported; {DEFAULT_IOR} is used"
-            ));
-            return Ok(DEFAULT_IOR);
-        }
-        if !(1.0..=MAX_IOR).contains(&ior) {
+        if ior != 0.0 && !(1.0..=MAX_IOR).contains(&ior) {
             return Err(format!(
                 "its index of refraction is {ior}, but it must be 0 or from 1 to {MAX_IOR}; correct it in the file"
             ));
@@ -176,6 +177,20 @@ impl Reader<'_> {
         Ok(dispersion)
     }
 
+    fn clearcoat(&self) -> Check<Clearcoat> {
+        let extension = self.extension(|extensions| extensions.others.get(coat::EXTENSION));
+        let clearcoat = extension.cloned().map(serde_json::from_value).transpose();
+        let clearcoat = clearcoat.map_err(|error| damaged(format_args!("its {}: {error}", coat::EXTENSION)))?;
+        Ok(clearcoat.unwrap_or_default())
+    }
+
+    fn coat(&mut self) -> Check<Coat> {
+        let clearcoat = self.clearcoat()?;
+        let [factor] = self.fractions("clearcoatFactor", [clearcoat.clearcoat_factor])?;
+        let [roughness] = self.fractions("clearcoatRoughnessFactor", [clearcoat.clearcoat_roughness_factor])?;
+        Ok(Coat { factor, roughness })
+    }
+
     fn emission(&mut self) -> Check<Vec3> {
         let strength = self.extension(|extensions| extensions.emissive_strength.as_ref());
         let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
@@ -184,18 +199,6 @@ impl Reader<'_> {
         let factor = not_negative("emissiveFactor", self.json.emissive_factor.0)?;
         let emission = factor.map(|factor| factor * strength);
         Ok(not_negative("emissiveFactor times emissiveStrength", emission)?.into())
-    }
-
-    fn warn_of_glass(&mut self) {
-        let specular = self.extension(|extensions| extensions.specular.as_ref());
-        let is_changed = |specular: &json::extensions::material::Specular| {
-            specular.specular_factor.0 != 1.0 || specular.specular_color_factor.0 != [1.0; 3]
-        };
-        if specular.is_some_and(is_changed) {
-            self.warn(
-                "KHR_materials_specular on glass isn't supported yet; its reflection follows the ior alone".into(),
-            );
-        }
     }
 
     /// Factor and colour of KHR_materials_specular.
@@ -232,20 +235,16 @@ impl Reader<'_> {
         let specular = self.extension(|extensions| extensions.specular.as_ref());
         let linear = |info: &Info| used(info, false);
         let color = |info: &Info| used(info, true);
-        let normal = match &json.normal_texture {
-            None => None,
-            Some(texture) => {
-                let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
-                let transform = others.and_then(|others| others.get("KHR_texture_transform")).cloned();
-                let transform = transform.map(serde_json::from_value).transpose();
-                Some(TextureUse {
-                    texture: texture.index.value(),
-                    set: texture.tex_coord,
-                    transform: transform.map_err(|error| damaged(format_args!("its normalTexture: {error}")))?,
-                    srgb: false,
-                })
-            }
-        };
+        let coat = self.clearcoat()?;
+        let normals = [
+            ("normalTexture", json.normal_texture.as_ref()),
+            ("clearcoatNormalTexture", coat.clearcoat_normal_texture.as_ref()),
+        ];
+        let mut uses_of_normals = [None, None];
+        for (normals, (name, texture)) in uses_of_normals.iter_mut().zip(normals) {
+            *normals = texture.map(|texture| used_normals(name, texture)).transpose()?;
+        }
+        let [normal, coat_normal] = uses_of_normals;
         let uses = [
             pbr.base_color_texture.as_ref().map(color),
             pbr.metallic_roughness_texture.as_ref().map(linear),
@@ -254,14 +253,12 @@ impl Reader<'_> {
             transmission.and_then(|it| it.transmission_texture.as_ref()).map(linear),
             specular.and_then(|it| it.specular_texture.as_ref()).map(linear),
             specular.and_then(|it| it.specular_color_texture.as_ref()).map(color),
+            coat.clearcoat_texture.as_ref().map(linear),
+            coat.clearcoat_roughness_texture.as_ref().map(linear),
+            coat_normal,
         ];
-        let scale = json.normal_texture.as_ref().map_or(1.0, |texture| texture.scale);
-        if scale.is_nan() || scale.abs() > STEEPEST {
-            return Err(format!(
-                "its normalTexture's scale is {scale}, but its size must be {STEEPEST} at the most; correct it in the file"
-            ));
-        }
-        let mut found = [None; 7];
+        let [scale, coat_scale] = normals.map(|(_, texture)| texture.map_or(1.0, |texture| texture.scale));
+        let mut found = [None; 10];
         for (found, wanted) in found.iter_mut().zip(&uses) {
             if let Some(wanted) = wanted {
                 *found = reader.lookup(wanted, &mut self.warnings)?;
@@ -275,6 +272,9 @@ impl Reader<'_> {
             transmission,
             specular,
             specular_color,
+            coat,
+            coat_roughness,
+            coat_normal,
         ] = found;
         Ok(MaterialTextures {
             base_color,
@@ -284,6 +284,9 @@ impl Reader<'_> {
             transmission,
             specular,
             specular_color,
+            coat,
+            coat_roughness,
+            coat_normal: coat_normal.map(|index| (index, coat_scale)),
         })
     }
 
@@ -306,6 +309,25 @@ impl Reader<'_> {
     fn warn(&mut self, warning: String) {
         self.warnings.push(warning);
     }
+}
+
+/// A texture of normals whose scale is one.
+fn used_normals(name: &str, texture: &NormalTexture) -> Check<TextureUse> {
+    let scale = texture.scale;
+    if scale.is_nan() || scale.abs() > STEEPEST {
+        return Err(format!(
+            "its {name}'s scale is {scale}, but its size must be {STEEPEST} at the most; correct it in the file"
+        ));
+    }
+    let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
+    let transform = others.and_then(|others| others.get("KHR_texture_transform")).cloned();
+    let transform = transform.map(serde_json::from_value).transpose();
+    Ok(TextureUse {
+        texture: texture.index.value(),
+        set: texture.tex_coord,
+        transform: transform.map_err(|error| damaged(format_args!("its {name}: {error}")))?,
+        srgb: false,
+    })
 }
 
 fn used(info: &Info, srgb: bool) -> TextureUse {

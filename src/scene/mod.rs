@@ -10,6 +10,7 @@ mod buffer;
 mod builder;
 mod bvh;
 mod camera;
+mod coat;
 mod contact;
 mod curve;
 mod diagnostic;
@@ -31,8 +32,10 @@ mod meshopt;
 mod morph;
 pub mod object_grid;
 mod packed;
+mod placement;
 mod primitive;
 mod punctual;
+mod sharing;
 mod skin;
 mod tangents;
 mod texture;
@@ -42,6 +45,7 @@ pub use features::SceneFeatures;
 pub(crate) use light_table::set_alias_table;
 pub use load::LoadOptions;
 pub use packed::PackedScene;
+pub use placement::Placement;
 pub use texture::Textures;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -126,6 +130,15 @@ pub struct Gloss {
     pub specular_f90: f32,
 }
 
+/// KHR_materials_clearcoat: a dielectric's reflection above all others.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Coat {
+    /// How much of it there is, 0 ..= 1; 0 for none.
+    pub factor: f32,
+    /// Its square is GGX's α; 0 ..= 1.
+    pub roughness: f32,
+}
+
 /// Where a surface is there at all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Alpha {
@@ -162,6 +175,12 @@ pub struct MaterialTextures {
     pub specular: Option<u32>,
     /// Reflectance at normal incidence.
     pub specular_color: Option<u32>,
+    /// How much of a clear coat there is, in red.
+    pub coat: Option<u32>,
+    /// Its roughness, in green.
+    pub coat_roughness: Option<u32>,
+    /// Its normals, and how far they lean.
+    pub coat_normal: Option<(u32, f32)>,
 }
 
 /// A glTF material, reduced to what is supported.
@@ -171,12 +190,17 @@ pub struct Material {
     pub name: String,
     /// How it scatters.
     pub surface: Surface,
+    /// What lies above that.
+    pub coat: Coat,
     /// Linear RGB albedo (matte), reflectance (mirror) or tint of each crossing (dielectric); each in 0 ..= 1.
     pub base_color: Vec3,
     /// Emitted radiance, linear RGB; zero for what isn't a light.
     pub emission: Vec3,
     /// Whether the back side emits as well. (Every surface scatters on both sides.)
-    pub double_sided: bool,
+    pub back_emits: bool,
+    /// Whether a camera looks through the back side, as glTF 2.0 has it of surfaces with one side. It reflects light and throws
+    /// shadows all the same, and mirrors and glass show it.
+    pub back_hidden: bool,
     /// KHR_materials_unlit: it is seen as its emission, but lights nothing and reflects nothing.
     pub unlit: bool,
     /// Where it is there.
@@ -194,6 +218,8 @@ pub struct Object {
     pub material: u32,
     /// Its triangles in [`Scene::triangles`].
     pub triangles: std::ops::Range<u32>,
+    /// Where it puts them, if it shares them with other objects.
+    pub placement: Option<Placement>,
 }
 
 /// A triangle of an object.
@@ -201,9 +227,12 @@ pub struct Object {
 pub struct Triangle {
     /// Indices into [`Scene::positions`] and what else vertices have, counter-clockwise seen from the front.
     pub vertices: [u32; 3],
-    /// Index into [`Scene::objects`].
+    /// Index into [`Scene::objects`], or [`SHARED`].
     pub object: u32,
 }
+
+/// [`Triangle::object`] of triangles that objects share.
+pub const SHARED: u32 = u32::MAX;
 
 /// What a camera's picture shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -255,7 +284,8 @@ pub struct Camera {
 pub struct Scene {
     /// File name without its extension.
     pub name: String,
-    /// Vertex positions in render space.
+    /// Vertex positions in render space; those of shared triangles within −1 ..= 1 in a space of their own, as their
+    /// normals and tangents are.
     pub positions: Vec<Vec3>,
     /// Unit shading normals, one per position.
     pub normals: Vec<Vec3>,
@@ -291,25 +321,61 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Lower and upper corner of the bounds of all vertices, in render space.
+    /// Lower and upper corner of the bounds of all triangles, in render space.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        self.positions
-            .iter()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), &position| {
-                (lower.min(position), upper.max(position))
-            })
+        let start = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        self.corners()
+            .fold(start, |(lower, upper), corner| (lower.min(corner), upper.max(corner)))
     }
 
-    /// Area of the triangle with that index, in square render units.
-    pub fn triangle_area(&self, triangle: u32) -> f64 {
+    /// Corners of all triangles of all objects, in render space.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = Vec3> {
+        let own = self.own_triangles().flat_map(|triangle| self.corners_of(triangle));
+        own.chain(self.placed_triangles().flat_map(|(_, corners)| corners))
+    }
+
+    /// Triangles that aren't shared.
+    pub(crate) fn own_triangles(&self) -> impl Iterator<Item = u32> {
+        let all = (0..).zip(&self.triangles);
+        all.filter(|(_, triangle)| triangle.object != SHARED)
+            .map(|(index, _)| index)
+    }
+
+    /// Indices of the objects that share triangles, and corners of those where they put them, in render space.
+    pub(crate) fn placed_triangles(&self) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+        let placed = (0..)
+            .zip(&self.objects)
+            .filter_map(|(index, object)| Some((index, object, object.placement?)));
+        placed.flat_map(move |(index, object, placement)| {
+            let triangles = object.triangles.clone();
+            triangles.map(move |triangle| (index, self.corners_of(triangle).map(|corner| placement.point(corner))))
+        })
+    }
+
+    /// Corners of a triangle in the space that it is in.
+    pub(crate) fn corners_of(&self, triangle: u32) -> [Vec3; 3] {
         let corners = self.triangles[triangle as usize].vertices;
-        let [a, b, c] = corners.map(|vertex| self.positions[vertex as usize].as_dvec3());
-        0.5 * (b - a).cross(c - a).length()
+        corners.map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// Area of the triangle with that index, which isn't shared, in square render units.
+    pub fn triangle_area(&self, triangle: u32) -> f64 {
+        area(self.corners_of(triangle))
     }
 
     /// Area of the object with that index, in square render units.
     pub fn object_area(&self, object: u32) -> f64 {
-        let triangles = self.objects[object as usize].triangles.clone();
-        triangles.map(|triangle| self.triangle_area(triangle)).sum()
+        let Object {
+            triangles, placement, ..
+        } = &self.objects[object as usize];
+        let place = |corner: Vec3| placement.map_or(corner, |placement| placement.point(corner));
+        let corners = triangles.clone().map(|triangle| self.corners_of(triangle).map(place));
+        corners.map(area).sum()
     }
+}
+
+/// Area of a triangle.
+pub(crate) fn area(corners: [Vec3; 3]) -> f64 {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    0.5 * (b - a).cross(c - a).length()
 }

@@ -14,11 +14,13 @@ const MOST_CELLS: u64 = 1 << 21;
 /// The grid of each object, and the number of cubes in all.
 pub fn object_grids(scene: &Scene) -> (Vec<ObjectGrid>, u32) {
     let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); scene.objects.len()];
-    for triangle in &scene.triangles {
-        let (low, high) = &mut boxes[triangle.object as usize];
-        for vertex in triangle.vertices {
-            *low = low.min(scene.positions[vertex as usize]);
-            *high = high.max(scene.positions[vertex as usize]);
+    let own = scene.own_triangles();
+    let own = own.map(|index| (scene.triangles[index as usize].object, scene.corners_of(index)));
+    for (object, corners) in own.chain(scene.placed_triangles()) {
+        let (low, high) = &mut boxes[object as usize];
+        for corner in corners {
+            *low = low.min(corner);
+            *high = high.max(corner);
         }
     }
     let mut pieces = PIECES;

@@ -1,15 +1,20 @@
 //! A scene in the layout of the device.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
 use glam::{DVec3, Vec3, Vec4};
 
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::object_grid::object_grids;
 use super::{
-    Alpha, Dielectric, Environment, Gloss, MaterialTextures, Scene, Surface, bvh, contact, environment, light_table,
+    Alpha, Dielectric, Environment, Gloss, MaterialTextures, Scene, Surface, area, bvh, contact, environment,
+    light_table,
 };
 use crate::layout::{
-    BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Light, MASK, Material, NO_LIGHT, NO_TEXTURE, OPAQUE,
-    ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED, TOUCHED, TRIANGLE_LIGHT, TextureLookup,
+    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Instance, Light, MASK,
+    Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED, TOUCHED,
+    TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// What the ray stages read, in the order of the BVH's leaves.
@@ -21,6 +26,10 @@ pub struct PackedScene {
     pub havel_triangles: Vec<HavelTriangle>,
     /// The same triangles for shading.
     pub shading_triangles: Vec<ShadingTriangle>,
+    /// How many of them are in render space. They come first.
+    pub own_triangles: u32,
+    /// Where the others are.
+    pub instances: Vec<Instance>,
     /// Materials.
     pub materials: Vec<Material>,
     /// What their corners have for textures, three to a triangle; none where nothing is textured.
@@ -55,17 +64,31 @@ impl PackedScene {
     /// # Errors
     /// A text, if there are too many triangles.
     pub fn new(scene: &Scene) -> Result<Self, String> {
-        let corners: Vec<[Vec3; 3]> = scene
-            .triangles
-            .iter()
-            .map(|triangle| triangle.vertices.map(|vertex| scene.positions[vertex as usize]))
-            .collect();
-        let bvh = bvh::build(&corners)?;
-        let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| corners[index as usize]).collect();
+        let SharedTriangles {
+            ranges,
+            materials: shared_materials,
+            placed,
+        } = shared_triangles(scene);
+        let bvh = bvh::build(scene, &ranges, &placed)?;
+        let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| scene.corners_of(index)).collect();
         let (lights, power) = light_table::lights(scene, &bvh.order);
-        let shaded = bvh.order.iter().zip(&corners);
-        let mut shading_triangles: Vec<_> = shaded
-            .map(|(&index, corners)| shading_triangle(scene, index, corners))
+        let own_triangles = bvh.shared.first().map_or(bvh.order.len() as u32, |shared| shared.start);
+        let own = bvh.order[..own_triangles as usize].iter().map(|&index| {
+            let object = scene.triangles[index as usize].object;
+            (index, scene.objects[object as usize].material)
+        });
+        let shared = bvh
+            .shared
+            .iter()
+            .zip(shared_materials)
+            .flat_map(|(triangles, material)| {
+                let order = &bvh.order[triangles.start as usize..triangles.end as usize];
+                order.iter().map(move |&index| (index, material))
+            });
+        let mut shading_triangles: Vec<_> = own
+            .chain(shared)
+            .zip(&corners)
+            .map(|((index, material), corners)| shading_triangle(scene, index, material, corners))
             .collect();
         let emissive = lights
             .iter()
@@ -75,11 +98,15 @@ impl PackedScene {
             shading_triangles[light.triangle as usize].light = index as u32;
         }
         let materials: Vec<Material> = scene.materials.iter().map(material).collect();
-        let touched = contact::touched(&bvh.records, &shading_triangles, &materials);
+        let instances = instances(scene, &placed, &bvh.shared);
+        let touched = contact::touched(&bvh.records, &shading_triangles, &instances, &materials);
         for (triangle, touched) in shading_triangles.iter_mut().zip(touched) {
             triangle.flags |= if touched { TOUCHED } else { 0 };
         }
-        let features = SceneFeatures::of(&shading_triangles, &materials, &lights);
+        let features = SceneFeatures {
+            instanced: !instances.is_empty(),
+            ..SceneFeatures::of(&shading_triangles, &materials, &lights)
+        };
         let mut texels = scene.textures.texels.clone();
         texels.resize(texels.len().next_multiple_of(4), 0);
         let (object_grids, object_cells) = object_grids(scene);
@@ -97,6 +124,8 @@ impl PackedScene {
             object_cells,
             havel_triangles: corners.iter().map(havel_triangle).collect(),
             shading_triangles,
+            own_triangles,
+            instances,
             bsdf_sampling: bsdf_sampling(scene, &lights),
             materials,
             lights,
@@ -109,6 +138,63 @@ impl PackedScene {
             scale: scene.normalisation.scale,
         })
     }
+
+    /// Triangles, shared ones as often as they are seen.
+    pub fn seen_triangles(&self) -> u64 {
+        let shared = self.instances.iter().map(|instance| u64::from(instance.triangle_count));
+        u64::from(self.own_triangles) + shared.sum::<u64>()
+    }
+
+    /// How many primitives instances share.
+    pub fn shared_primitives(&self) -> usize {
+        let firsts = self.instances.iter().map(|instance| instance.first_triangle);
+        firsts.collect::<BTreeSet<_>>().len()
+    }
+}
+
+/// What of a scene objects share.
+struct SharedTriangles {
+    /// In [`Scene::triangles`].
+    ranges: Vec<Range<u32>>,
+    materials: Vec<u32>,
+    /// In the order of the objects.
+    placed: Vec<bvh::Instance>,
+}
+
+fn shared_triangles(scene: &Scene) -> SharedTriangles {
+    let mut found = SharedTriangles {
+        ranges: Vec::new(),
+        materials: Vec::new(),
+        placed: Vec::new(),
+    };
+    let mut known = BTreeMap::new();
+    for object in &scene.objects {
+        let Some(placement) = object.placement else { continue };
+        let shared = *known.entry(object.triangles.start).or_insert_with(|| {
+            found.ranges.push(object.triangles.clone());
+            found.materials.push(object.material);
+            found.ranges.len() - 1
+        });
+        found.placed.push(bvh::Instance { shared, placement });
+    }
+    found
+}
+
+fn instances(scene: &Scene, placed: &[bvh::Instance], shared: &[Range<u32>]) -> Vec<Instance> {
+    let objects = (0..)
+        .zip(&scene.objects)
+        .filter(|(_, object)| object.placement.is_some());
+    let instance = |((object, _), placed): ((u32, _), &bvh::Instance)| {
+        let triangles = &shared[placed.shared];
+        Instance {
+            rows: placed.placement.rows,
+            object,
+            mirrored: placed.placement.is_mirrored().into(),
+            first_triangle: triangles.start,
+            triangle_count: triangles.len() as u32,
+        }
+    };
+    objects.zip(placed).map(instance).collect()
 }
 
 /// Havel and Herout, «Yet faster ray-triangle intersection (using SSE4)», 2010, with u and v for the second and the
@@ -130,7 +216,7 @@ pub fn havel_triangle(corners: &[Vec3; 3]) -> HavelTriangle {
     }
 }
 
-fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTriangle {
+fn shading_triangle(scene: &Scene, index: u32, material_index: u32, corners: &[Vec3; 3]) -> ShadingTriangle {
     let triangle = scene.triangles[index as usize];
     let normals = triangle.vertices.map(|vertex| scene.normals[vertex as usize]);
     let [a, b, c] = corners.map(Vec3::as_dvec3);
@@ -140,7 +226,7 @@ fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTr
         let p = corners[i];
         [p.x, p.y, p.z, f32::from_bits(encode_direction(normals[i]))]
     };
-    let material = &scene.materials[scene.objects[triangle.object as usize].material as usize];
+    let material = &scene.materials[material_index as usize];
     let colored = triangle.vertices.iter().any(|&vertex| {
         let color = scene.colors.get(vertex as usize);
         color.is_some_and(|color| *color != Vec4::ONE)
@@ -151,7 +237,7 @@ fn shading_triangle(scene: &Scene, index: u32, corners: &[Vec3; 3]) -> ShadingTr
         p1: vertex(1),
         p2: vertex(2),
         object: triangle.object,
-        material: scene.objects[triangle.object as usize].material,
+        material: material_index,
         flags: if smooth_shaded { SMOOTH_SHADED } else { 0 }
             | if textured { TEXTURED } else { 0 }
             | if material.alpha == Alpha::Opaque {
@@ -182,7 +268,7 @@ fn material(material: &super::Material) -> Material {
         surface,
         emission: material.emission.to_array(),
         ior: inside.ior,
-        double_sided: material.double_sided.into(),
+        sides: if material.back_emits { BACK_EMITS } else { 0 } | if material.back_hidden { BACK_HIDDEN } else { 0 },
         metallic: gloss.metallic,
         roughness: glass.map_or(gloss.roughness, |glass| glass.roughness),
         transmission: inside.transmission,
@@ -202,6 +288,14 @@ fn material(material: &super::Material) -> Material {
         alpha_cutoff,
         alpha,
         dispersion: inside.dispersion,
+        coat: material.coat.factor,
+        coat_roughness: material.coat.roughness,
+        coat_texture: textures.coat.unwrap_or(NO_TEXTURE),
+        coat_roughness_texture: textures.coat_roughness.unwrap_or(NO_TEXTURE),
+        coat_normal_texture: textures.coat_normal.map_or(NO_TEXTURE, |(texture, _)| texture),
+        coat_normal_scale: textures.coat_normal.map_or(0.0, |(_, scale)| scale),
+        padding0: 0,
+        padding1: 0,
     }
 }
 
@@ -242,8 +336,10 @@ fn bsdf_sampling(scene: &Scene, lights: &[Light]) -> f32 {
     if emissive == 0.0 && scene.environment.is_none() {
         return 0.0;
     }
-    let all: f64 = (0..scene.triangles.len() as u32)
-        .map(|triangle| scene.triangle_area(triangle))
+    let own = scene.own_triangles().map(|triangle| scene.corners_of(triangle));
+    let all: f64 = own
+        .chain(scene.placed_triangles().map(|(_, corners)| corners))
+        .map(area)
         .sum();
     ((emissive / all + 0.5 * from_afar) as f32).clamp(0.05, 0.5)
 }

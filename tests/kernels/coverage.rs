@@ -18,7 +18,10 @@ fn on_device(bench: &mut Bench, points: &[VisiblePoint], statistics: &[Statistic
     let mut recording = Recording::new();
     recording.fill(BufferId::Status, 0);
     recording.fill(BufferId::CoverageOf, 0);
-    let constants = vec![("SAMPLER", bench.config.sampler as u32)];
+    let constants = vec![
+        ("SAMPLER", bench.config.sampler as u32),
+        ("INSTANCED", u32::from(bench.scene.features.instanced)),
+    ];
     let push = [0, 0, bench.config.coverage_points(0)];
     recording.dispatch(
         StageDesc::new(&shaders::COVERAGE, points.len() as u32)
@@ -31,7 +34,7 @@ fn on_device(bench: &mut Bench, points: &[VisiblePoint], statistics: &[Statistic
 
 #[test]
 fn points_can_have_photons_where_the_cpu_says_so() {
-    for name in ["cornell", "cornell-spheres", "pool"] {
+    for name in ["cornell", "cornell-spheres", "pool", "instances"] {
         let config = RenderConfig {
             radius: Some(0.1),
             ..small()

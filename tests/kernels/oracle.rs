@@ -40,7 +40,7 @@ fn the_hierarchy_finds_the_hits_that_testing_every_triangle_finds() {
         accel: Accel::Brute,
         ..small()
     };
-    for name in ["cornell-spheres", "pool", "ring"] {
+    for name in ["cornell-spheres", "pool", "ring", "instances"] {
         let scene = packed(&scene(name));
         let (bvh, brute) = (
             inputs(&scene, &settings, &with_bvh),

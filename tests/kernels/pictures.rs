@@ -56,8 +56,11 @@ fn both_backends_render_the_same_picture() {
         ("glossy", Estimator::Sppm, Direct::Light),
         ("glossy", Estimator::Ppm, Direct::Photons),
         ("glasses", Estimator::Sppm, Direct::Light),
+        ("coats", Estimator::Sppm, Direct::Light),
+        ("coats", Estimator::Ppm, Direct::Photons),
         ("textures", Estimator::Sppm, Direct::Light),
         ("textures", Estimator::Ppm, Direct::Photons),
+        ("instances", Estimator::Sppm, Direct::Light),
         ("glossy, lit", Estimator::Sppm, Direct::Light),
         ("ring, lit", Estimator::Ppm, Direct::Photons),
     ] {

@@ -1,40 +1,47 @@
 //! Rays against triangles on the device: where rounding decides, nothing may pass between two triangles.
 
 use glam::Vec3;
-use ppm_vk::config::{RenderConfig, TriangleTest};
+use ppm_vk::config::{Accel, RenderConfig, TriangleTest};
 use ppm_vk::gpu::Device;
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::record::Recording;
-use ppm_vk::scene::{PackedScene, Scene, Triangle};
+use ppm_vk::scene::{Object, PackedScene, Placement, SHARED, Scene, SceneFeatures, Triangle};
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::bench::{random_numbers, scene};
 
 /// A ray as the probe reads it: origin, then direction.
-type Ray = [[f32; 4]; 2];
+pub type Ray = [[f32; 4]; 2];
 
 /// Rays traced at once.
 const BATCH: usize = 1 << 17;
 
-fn ray(origin: Vec3, direction: Vec3) -> Ray {
+pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
     [origin, direction].map(|v| [v.x, v.y, v.z, 0.0])
 }
 
-/// What rays meet of a closed surface that they start in.
-struct Probe {
+/// What rays meet.
+pub struct Probe {
     renderer: Renderer,
     triangle_test: TriangleTest,
+    accel: Accel,
+    features: SceneFeatures,
 }
 
 impl Probe {
     fn new(scene: &Scene, triangle_test: TriangleTest) -> Self {
+        Self::with(scene, triangle_test, Accel::Bvh)
+    }
+
+    pub fn with(scene: &Scene, triangle_test: TriangleTest, accel: Accel) -> Self {
         let packed = PackedScene::new(scene).expect("a hierarchy");
         let config = RenderConfig {
             resolution: [8, 8],
             photons: 64,
             radius: Some(0.1),
             triangle_test,
+            accel,
             ..RenderConfig::default()
         };
         let device = Device::open(None).expect("a Vulkan device");
@@ -42,7 +49,29 @@ impl Probe {
         Self {
             renderer,
             triangle_test,
+            accel,
+            features: packed.features,
         }
+    }
+
+    /// t, u, v, and the bits of the object or of `u32::MAX`.
+    pub fn hits(&mut self, rays: &[Ray]) -> Vec<[f32; 4]> {
+        self.renderer.gpu().upload(BufferId::ProbeFrom, rays).expect("rays");
+        let gpu = self.renderer.gpu();
+        gpu.create(BufferId::ProbeTo, (16 * rays.len()) as u64).expect("hits");
+        let mut recording = Recording::new();
+        let constants = vec![
+            ("HAVEL", u32::from(self.triangle_test == TriangleTest::Havel)),
+            ("BRUTE_FORCE", u32::from(self.accel == Accel::Brute)),
+            ("INSTANCED", u32::from(self.features.instanced)),
+        ];
+        recording.dispatch(
+            StageDesc::new(&shaders::RAY_PROBE, rays.len() as u32)
+                .constants(constants)
+                .push(rays.len() as u32),
+        );
+        gpu.run(&recording).expect("a run");
+        gpu.download(BufferId::ProbeTo, Some(rays.len())).expect("hits")
     }
 
     /// How many of the rays meet nothing, and one of them.
@@ -51,18 +80,7 @@ impl Probe {
         let mut rays = rays.peekable();
         while rays.peek().is_some() {
             let batch: Vec<Ray> = rays.by_ref().take(BATCH).collect();
-            self.renderer.gpu().upload(BufferId::ProbeFrom, &batch).expect("rays");
-            let gpu = self.renderer.gpu();
-            gpu.create(BufferId::ProbeTo, (16 * batch.len()) as u64).expect("hits");
-            let mut recording = Recording::new();
-            let constants = vec![("HAVEL", u32::from(self.triangle_test == TriangleTest::Havel))];
-            recording.dispatch(
-                StageDesc::new(&shaders::RAY_PROBE, batch.len() as u32)
-                    .constants(constants)
-                    .push(batch.len() as u32),
-            );
-            gpu.run(&recording).expect("a run");
-            let hits: Vec<[f32; 4]> = gpu.download(BufferId::ProbeTo, Some(batch.len())).expect("hits");
+            let hits = self.hits(&batch);
             for (ray, hit) in batch.iter().zip(&hits) {
                 traced += 1;
                 let missed = hit[3].to_bits() == u32::MAX;
@@ -151,6 +169,65 @@ fn no_ray_passes_a_shared_edge_or_corner() {
     assert_tight("edges and corners of a bipyramid", &scene, || {
         rays_at_edges(&scene, count)
     });
+}
+
+#[test]
+fn no_ray_passes_between_triangles_that_an_instance_puts_somewhere() {
+    let count = if long() { 10_000_000 } else { 100_000 };
+    for triangles in [bipyramid(&evenly(97)), slivers()] {
+        for rows in [
+            [[0.3, -0.1, 0.2, 0.4], [0.1, 0.02, -0.3, -0.3], [0.05, 0.4, 0.1, 0.2]],
+            [[-1.0, 0.0, 0.0, 0.0], [0.0, 1e-3, 0.0, 0.7], [0.0, 0.0, 0.5, -0.1]],
+        ] {
+            let placed = placed(&triangles, Placement { rows });
+            let rays = || -> Box<dyn Iterator<Item = Ray>> {
+                let point = |[x, y, z, _]: [f32; 4]| Vec3::new(x, y, z);
+                let rays = rays_at_edges(&triangles, count).map(move |[origin, direction]| {
+                    let placement = Placement { rows };
+                    let from = placement.point(point(origin));
+                    ray(from, placement.point(point(origin) + point(direction)) - from)
+                });
+                Box::new(rays)
+            };
+            assert_tight("edges and corners of an instance", &placed, rays);
+        }
+    }
+}
+
+/// A closed surface as the only instance of its triangles, and a lamp far away.
+fn placed(closed: &Scene, placement: Placement) -> Scene {
+    let mut scene = closed.clone();
+    let count = scene.triangles.len() as u32;
+    for triangle in &mut scene.triangles {
+        triangle.object = SHARED;
+    }
+    let mut surface = scene.materials[0].clone();
+    surface.emission = Vec3::ZERO;
+    let first = scene.positions.len() as u32;
+    let far = [
+        Vec3::new(5.0, 5.0, 5.0),
+        Vec3::new(6.0, 5.0, 5.0),
+        Vec3::new(5.0, 6.0, 5.0),
+    ];
+    scene.positions.extend(far);
+    scene.normals.extend([Vec3::Z; 3]);
+    scene.triangles.push(Triangle {
+        vertices: [first, first + 1, first + 2],
+        object: 1,
+    });
+    scene.materials.push(surface);
+    let object = |material, triangles, placement| Object {
+        name: String::new(),
+        material,
+        triangles,
+        placement,
+    };
+    let matte = scene.materials.len() as u32 - 1;
+    scene.objects = vec![
+        object(matte, 0..count, Some(placement)),
+        object(0, count..count + 1, None),
+    ];
+    scene
 }
 
 #[test]

@@ -2,15 +2,17 @@
 
 use std::f64::consts::PI;
 
-use glam::dvec3;
+use glam::{Vec3, dvec3};
+use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
-use ppm_vk::scene::Projection;
+use ppm_vk::cpu;
+use ppm_vk::scene::{Environment, Projection};
 
-use crate::document::{Document, light, matte};
+use crate::document::{Document, light, matte, mirror, one_sided};
 use crate::measure::{Region, measure};
 use crate::mesh::Mesh;
 use crate::picture::{Subject, small};
-use crate::stage::subject;
+use crate::stage::{subject, subject_under};
 
 const SIDE: usize = 48;
 
@@ -84,5 +86,41 @@ fn an_edge_out_of_focus_is_blurred_by_the_lens() {
         };
         let expected = (0..16).map(|i| share((f64::from(i) + 0.5) / 16.0)).sum::<f64>() / 16.0;
         measured.assert_between(expected - 1e-3, expected + 1e-3, &format!("column {at}"));
+    }
+}
+
+/// A black sheet that turns its back to the camera, in light of radiance 1 from everywhere, and again in a mirror.
+#[test]
+fn the_back_of_a_surface_with_one_side_is_seen_in_mirrors_alone() {
+    const SIDE: u32 = 16;
+    for (hidden, mirrored) in [(false, false), (true, false), (true, true)] {
+        let mut scene = Document::new("sheet");
+        let black = matte("black", [0.0; 3]);
+        let sheet = scene.material(if hidden { one_sided(black) } else { black });
+        let glass = scene.material(mirror("mirror", [1.0; 3]));
+        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
+        let at = |z: f64| corners.map(|[x, y]| dvec3(x, y, z));
+        // Both face away from the camera, or in the mirror's case towards it and away from the mirror.
+        if mirrored {
+            scene.object("mirror", &Mesh::quad(at(-1.0)).flipped(), glass);
+            scene.object("sheet", &Mesh::quad(at(2.0)).flipped(), sheet);
+        } else {
+            scene.object("sheet", &Mesh::quad(at(0.0)), sheet);
+        }
+        scene.camera([0.0, 1.0], [0.0, 0.0], 20.0);
+        let subject = subject_under(scene, Some(Environment::constant(Vec3::ONE)));
+        let expected = if hidden && !mirrored { 1.0 } else { 0.0 };
+        let config = small(SIDE, 100);
+        let mut device = subject.renderer(config.clone());
+        let mut twin = cpu::Renderer::new(&subject.packed, &subject.scene.cameras[0], config).expect("renderer");
+        for renderer in [&mut device as &mut dyn Backend, &mut twin] {
+            renderer.iterate().expect("an iteration");
+            let image = renderer.resolve().expect("a picture");
+            let wrong = image.pixels().iter().find(|pixel| **pixel != [expected; 3]);
+            assert_eq!(
+                wrong, None,
+                "hidden {hidden}, in a mirror {mirrored}: {expected} expected"
+            );
+        }
     }
 }

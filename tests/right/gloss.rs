@@ -6,7 +6,7 @@ use glam::{DVec3, dvec3};
 use ppm_vk::config::{Direct, RenderConfig};
 use ppm_vk::cpu::{PathKind, Random, Reflector};
 
-use crate::document::{Document, light, metallic_roughness};
+use crate::document::{Document, light, matte, metallic_roughness};
 use crate::measure::{Measured, Region, measure};
 use crate::mesh::Mesh;
 use crate::picture::small;
@@ -15,23 +15,25 @@ use crate::stage::{camera_ray, subject};
 const ALPHAS: [f64; 5] = [0.01, 0.1, 0.3, 0.6, 1.0];
 const COSINES: [f64; 4] = [0.05, 0.3, 0.7, 1.0];
 
-fn metal(alpha: f64) -> Reflector {
+pub fn metal(alpha: f64) -> Reflector {
     Reflector {
         diffuse: DVec3::ZERO,
         f0: dvec3(0.95, 0.64, 0.3),
-        specular: 1.0,
-        metallic: 1.0,
+        f90: 1.0,
+        over_base: [0.0; 2],
         alpha,
+        coat: 0.0,
     }
 }
 
-fn plastic(alpha: f64) -> Reflector {
+pub fn plastic(alpha: f64) -> Reflector {
     Reflector {
         diffuse: dvec3(0.8, 0.5, 0.1),
         f0: DVec3::splat(0.04),
-        specular: 1.0,
-        metallic: 0.0,
+        f90: 1.0,
+        over_base: [0.04, 1.0],
         alpha,
+        coat: 0.0,
     }
 }
 
@@ -110,19 +112,22 @@ fn reflected_directions_have_the_density_that_is_said() {
 fn light_and_viewer_may_change_places() {
     for index in 0..10_000 {
         let [a, b, c, d] = uniform(index, PathKind::Camera);
-        let [e, ..] = uniform(index, PathKind::LightSample);
+        let [e, f, ..] = uniform(index, PathKind::LightSample);
         let direction = |cosine: f64, turn: f64| {
             let sin = (1.0 - cosine * cosine).sqrt();
             dvec3(sin * (2.0 * PI * turn).cos(), sin * (2.0 * PI * turn).sin(), cosine)
         };
         let (v, l) = (direction(a, b), direction(c, d));
-        let reflector = plastic(0.02 + e);
+        let reflector = Reflector {
+            coat: f,
+            ..plastic(0.02 + e)
+        };
         let (one, other) = (reflector.brdf(DVec3::Z, v, l), reflector.brdf(DVec3::Z, l, v));
         assert!((one - other).length() <= 1e-10 * one.length(), "{v} {l}: {one} {other}");
     }
 }
 
-/// ∫ BRDF · cos by the microfacet normals' own measure, and the base's by angle.
+/// ∫ BRDF · cos by the microfacet normals' own measure, and the base's by angle; without what a smooth boundary mirrors.
 pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
     let (n, v) = (DVec3::Z, viewer(cosine));
     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(steps);
@@ -146,7 +151,7 @@ pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
         sum += base.brdf(n, v, l) * PI;
         let (h, solid_angle) = microfacet(reflector.alpha, [s, turn]);
         let l = 2.0 * v.dot(h) * h - v;
-        if v.dot(h) > 0.0 && l.z > 0.0 {
+        if reflector.alpha > 0.0 && v.dot(h) > 0.0 && l.z > 0.0 {
             sum += mirrors.brdf(n, v, l) * l.z * 4.0 * v.dot(h) * solid_angle;
         }
     }
@@ -242,9 +247,10 @@ fn a_base_lies_under_the_largest_channel_of_what_is_no_metal() {
     let reflector = Reflector {
         diffuse: color * (1.0 - metallic),
         f0: f0.lerp(color, metallic),
-        specular,
-        metallic,
+        f90: specular * (1.0 - metallic) + metallic,
+        over_base: [0.24, specular],
         alpha: 0.0,
+        coat: 0.0,
     };
     for cosine in COSINES {
         let l = dvec3(-viewer(cosine).x, 0.0, cosine);
@@ -283,5 +289,46 @@ fn a_coated_white_base_gains_no_more_than_the_model_does() {
             mean < 1.06 && mean > 0.9,
             "α {alpha}: {mean} of diffuse light is reflected"
         );
+    }
+}
+
+/// At the ends of the roughnesses that are mirrors, that paths follow, and that visible points have, the picture goes on as it
+/// was: a plate in a black room with one shining wall.
+#[test]
+fn roughness_passes_over_from_mirrors_to_wide_lobes_without_a_step() {
+    const SIDE: usize = 32;
+    // α is 1e-3 and 0.1 in the middle of the second and the third.
+    for (one, other) in [(0.0, 0.01), (0.0312, 0.0320), (0.3160, 0.3164)] {
+        for metallic in [0.0, 1.0] {
+            let regions = [([12, 16], 5), ([16, 16], 12)];
+            let regions = regions.map(|(centre, side)| Region::around(centre, side));
+            let [one_mean, other_mean] = [one, other].map(|roughness| {
+                let mut scene = Document::new("plate");
+                let plate = scene.material(metallic_roughness("plate", [0.9; 3], metallic, roughness));
+                let wall = scene.material(light("wall", [1.0; 3]));
+                let black = scene.material(matte("black", [0.0; 3]));
+                scene.object("plate", &Mesh::facing_up(0.9, 0.0), plate);
+                let room = Mesh::cuboid(dvec3(-1.0, -0.1, -1.0), dvec3(1.0, 1.4, 1.0)).flipped();
+                scene.object("room", &room, black);
+                // The middle of the picture mirrors its edge.
+                let corners = [[-0.95, 0.85], [0.0, 0.85], [0.0, 1.35], [-0.95, 1.35]];
+                let corners = corners.map(|[x, y]| dvec3(x, y, -0.95));
+                scene.object("wall", &Mesh::quad(corners), wall);
+                scene.camera([0.8, 0.85], [0.0, 0.0], 20.0);
+                let config = RenderConfig {
+                    radius: Some(0.1),
+                    ..small(SIDE as u32, 1000)
+                };
+                measure(&subject(scene), config, 64, |image| {
+                    regions.iter().map(|region| region.of(image, 0)).collect()
+                })
+            });
+            for (region, (one_mean, other_mean)) in one_mean.iter().zip(&other_mean).enumerate() {
+                let what = format!("metallic {metallic}, roughness {other} less {one}, region {region}");
+                // How much a lobe widens over the interval.
+                let slack = 3e-3;
+                other_mean.minus(one_mean).assert_between(-slack, slack, &what);
+            }
+        }
     }
 }

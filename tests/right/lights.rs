@@ -110,8 +110,9 @@ fn polished_metal_shows_the_highlight_of_a_point() {
     let reflector = Reflector {
         diffuse: DVec3::ZERO,
         f0: F0.into(),
-        specular: 1.0,
-        metallic: 1.0,
+        f90: 1.0,
+        over_base: [0.0; 2],
+        coat: 0.0,
         alpha: ROUGHNESS * ROUGHNESS,
     };
     let sun = DVec3::new(0.0, 0.8_f64.sin(), 0.8_f64.cos());

@@ -146,9 +146,10 @@ fn a_surface_that_is_half_clear_scatters_the_other_half() {
     let lacquer = Reflector {
         diffuse: DVec3::splat(0.9),
         f0: DVec3::splat(0.04),
-        specular: 1.0,
-        metallic: 0.0,
+        f90: 1.0,
+        over_base: [0.04, 1.0],
         alpha: 0.0,
+        coat: 0.0,
     };
     for direct in [Direct::Light, Direct::Photons] {
         measured_and_expected(&subject, direct, |cosine| {

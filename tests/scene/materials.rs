@@ -1,5 +1,6 @@
 //! Materials: what is supported, what is named in a warning, and what is refused.
 
+use glam::Vec3;
 use ppm_vk::scene::{Dielectric, Material, Surface};
 use serde_json::{Value, json};
 
@@ -56,7 +57,7 @@ fn the_base_colour_is_the_albedo_of_a_matte_surface() {
     assert_eq!(material.base_color.to_array(), [0.25, 0.5, 0.75]);
     assert_eq!(material.emission.to_array(), [0.0; 3]);
     assert_eq!(material.name, "floor");
-    assert!(material.double_sided);
+    assert!(material.back_emits);
 }
 
 #[test]
@@ -65,7 +66,7 @@ fn metallic_1_with_roughness_0_is_a_mirror() {
     let material = loaded(json!({"pbrMetallicRoughness": pbr}));
     assert_eq!(material.surface, Surface::Mirror);
     assert_eq!(material.base_color.to_array(), [1.0, 0.75, 0.25]);
-    assert!(!material.double_sided);
+    assert!(!material.back_emits);
 }
 
 #[test]
@@ -171,6 +172,22 @@ fn negative_and_infinite_factors_are_refused() {
             extension("KHR_materials_volume", "attenuationDistance", json!(0)),
             "attenuationDistance is 0",
         ),
+        (
+            extension("KHR_materials_clearcoat", "clearcoatFactor", json!(-1)),
+            "clearcoatFactor is -1",
+        ),
+        (
+            extension("KHR_materials_clearcoat", "clearcoatRoughnessFactor", json!(-1)),
+            "clearcoatRoughnessFactor is -1",
+        ),
+        (
+            extension(
+                "KHR_materials_clearcoat",
+                "clearcoatNormalTexture",
+                json!({"index": 0, "scale": 1e6}),
+            ),
+            "clearcoatNormalTexture's scale is 1000000",
+        ),
     ];
     for (material, part) in cases {
         floor_of(material).assert_fails(&["material 0 \"floor\"", part, "correct it"]);
@@ -181,23 +198,44 @@ fn negative_and_infinite_factors_are_refused() {
 }
 
 #[test]
-fn what_is_rendered_otherwise_is_named_in_a_warning() {
+fn metal_that_claims_to_be_glass_is_named_in_a_warning() {
     let mut metal_glass = glass(json!({}));
     metal_glass["pbrMetallicRoughness"]["metallicFactor"] = json!(1);
-    let cases: [(Value, &[&str]); 3] = [
-        (metal_glass, &["metallicFactor 1", "transmission"]),
-        (
-            glass(json!({"KHR_materials_specular": {"specularFactor": 0.5}})),
-            &["KHR_materials_specular", "ior alone"],
-        ),
-        (
-            glass(json!({"KHR_materials_ior": {"ior": 0}})),
-            &["index of refraction of 0", "1.5 is used"],
-        ),
-    ];
-    for (material, parts) in cases {
-        let parts = [&["material 0 \"floor\""], parts].concat();
-        floor_of(material).assert_warns(&parts);
+    floor_of(metal_glass).assert_warns(&["material 0 \"floor\"", "metallicFactor 1", "transmission"]);
+}
+
+#[test]
+fn a_coat_lies_on_any_surface() {
+    let coat = |mut material: Value| {
+        material["extensions"]["KHR_materials_clearcoat"] =
+            json!({"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25});
+        loaded(material)
+    };
+    let mirror = json!({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}});
+    for material in [matte(json!({})), glass(json!({})), mirror.clone()] {
+        let coat = coat(material).coat;
+        assert_eq!((coat.factor, coat.roughness), (0.5, 0.25));
+    }
+    assert_eq!(loaded(mirror).coat.factor, 0.0);
+    // What is Lambertian without a coat has the microfacets of none below it.
+    match coat(matte(json!({}))).surface {
+        Surface::Glossy(gloss) => assert_eq!((gloss.specular_f0, gloss.specular_f90), (Vec3::ZERO, 0.0)),
+        surface => panic!("{surface:?}"),
+    }
+}
+
+#[test]
+fn an_index_of_0_reflects_all_at_every_angle() {
+    let plastic = json!({
+        "pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {"KHR_materials_ior": {"ior": 0}}
+    });
+    for material in [plastic, glass(json!({"KHR_materials_ior": {"ior": 0}}))] {
+        let gloss = match loaded(material).surface {
+            Surface::Glossy(gloss) => gloss,
+            Surface::Dielectric(glass) => glass.gloss,
+            surface => panic!("{surface:?}"),
+        };
+        assert_eq!((gloss.specular_f0, gloss.specular_f90), (Vec3::ONE, 1.0));
     }
 }
 

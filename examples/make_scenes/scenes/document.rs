@@ -111,7 +111,7 @@ pub fn emitting(mut material: Value, radiance: [f64; 3]) -> Value {
     material
 }
 
-/// `material` without its back, which matters to emission alone.
+/// `material` whose back doesn't emit, and is hidden from cameras.
 pub fn one_sided(mut material: Value) -> Value {
     material["doubleSided"] = json!(false);
     material
@@ -190,6 +190,22 @@ impl Document {
         self.node(json!({ "name": name, "mesh": mesh }))
     }
 
+    /// The mesh that was added last.
+    pub fn last_mesh(&self) -> usize {
+        self.meshes.len() - 1
+    }
+
+    /// Adds another node that shows a mesh.
+    pub fn again(&mut self, name: &str, mesh: usize) -> Node<'_> {
+        self.node(json!({ "name": name, "mesh": mesh }))
+    }
+
+    /// Adds a node that is the parent of the last so many.
+    pub fn group(&mut self, name: &str, count: usize) -> Node<'_> {
+        let children: Vec<usize> = (self.nodes.len() - count..self.nodes.len()).collect();
+        self.node(json!({ "name": name, "children": children }))
+    }
+
     /// Adds a camera in the plane x = 0 at `eye` that looks at `target` (each y, z), with an aspect ratio of 1.
     pub fn camera(&mut self, eye: [f64; 2], target: [f64; 2], field_of_view_degrees: f64) {
         let perspective = json!({
@@ -233,6 +249,11 @@ impl Document {
         if !self.lights.is_empty() {
             extensions.insert("KHR_lights_punctual");
         }
+        let is_child = |node: usize| {
+            let children = self.nodes.iter().filter_map(|node| node["children"].as_array());
+            children.flatten().any(|child| *child == json!(node))
+        };
+        let roots: Vec<usize> = (0..self.nodes.len()).filter(|&node| !is_child(node)).collect();
         if self.transforms {
             extensions.insert("KHR_texture_transform");
         }
@@ -240,7 +261,7 @@ impl Document {
         let mut document = json!({
             "asset": { "version": "2.0", "generator": "ppm-vk make_scenes", "copyright": "CC0-1.0" },
             "scene": 0,
-            "scenes": [{ "name": self.name, "nodes": (0..self.nodes.len()).collect::<Vec<_>>() }],
+            "scenes": [{ "name": self.name, "nodes": roots }],
             "nodes": self.nodes,
             "meshes": self.meshes,
             "materials": self.materials,
@@ -342,6 +363,12 @@ impl Node<'_> {
     pub fn rotated(&mut self, axis: [f64; 3], radians: f64) -> &mut Self {
         let (sin, cos) = (0.5 * radians).sin_cos();
         self.0["rotation"] = json!([axis[0] * sin, axis[1] * sin, axis[2] * sin, cos]);
+        self
+    }
+
+    /// Scales it along its axes, before the rotation.
+    pub fn scaled(&mut self, factors: [f64; 3]) -> &mut Self {
+        self.0["scale"] = json!(factors);
         self
     }
 }

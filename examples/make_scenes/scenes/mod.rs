@@ -1,15 +1,13 @@
 //! The project's own scenes. Units are metres, y is up; radiance is linear RGB.
 
 mod document;
+mod known;
 mod mesh;
+mod spheres;
 
-use document::{
-    Document, File, Filter, clear, emitting, glass, light, matte, metallic_roughness, mirror, one_sided, png,
-    with_texture,
-};
-use glam::{DVec3, dvec3};
+use document::{Document, File, Filter, clear, glass, light, matte, metallic_roughness, mirror, png, with_texture};
+use glam::{DVec3, dvec2, dvec3};
 use mesh::Mesh;
-use serde_json::Value;
 use serde_json::json;
 use std::f64::consts::FRAC_PI_2;
 
@@ -22,20 +20,22 @@ const BLACK: [f64; 3] = [0.0; 3];
 pub fn all() -> Vec<File> {
     [
         cornell(),
-        cornell_spheres(),
-        glossy(),
-        glasses(),
+        spheres::cornell_spheres(),
+        spheres::glossy(),
+        spheres::glasses(),
+        spheres::coats(),
         textures(),
+        instances(),
         ring(),
         pool("pool", false),
         pool("pool-tiles", true),
-        furnace_diffuse(),
-        furnace_specular(),
-        furnace_closed(),
-        light_area(),
+        known::furnace_diffuse(),
+        known::furnace_specular(),
+        known::furnace_closed(),
+        known::light_area(),
         lights(),
         plaza(),
-        slab(),
+        known::slab(),
     ]
     .into_iter()
     .flat_map(Document::finish)
@@ -57,59 +57,6 @@ fn cornell() -> Document {
         .rotated([0.0, 1.0, 0.0], -17_f64.to_radians());
     scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
     scene
-}
-
-/// The same room with a mirror and a glass sphere.
-fn cornell_spheres() -> Document {
-    let mut scene = cornell_room("cornell-spheres");
-    let mirror = scene.material(mirror("mirror", [0.95; 3]));
-    let glass = scene.material(clear("glass", 1.5));
-    let sphere = Mesh::icosphere(0.38, 4);
-    scene
-        .object("mirror-sphere", &sphere, mirror)
-        .at([-0.45, 0.3805, -0.35]);
-    scene.object("glass-sphere", &sphere, glass).at([0.42, 0.3805, 0.35]);
-    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
-    scene
-}
-
-/// The same room with a sphere of each of these materials.
-fn four_spheres(name: &'static str, materials: [Value; 4]) -> Document {
-    let mut scene = cornell_room(name);
-    let sphere = Mesh::icosphere(0.3, 4);
-    let places = [[-0.6, -0.4], [0.1, -0.55], [-0.25, 0.35], [0.5, 0.25]];
-    for (material, [x, z]) in materials.into_iter().zip(places) {
-        let material = scene.material(material);
-        scene.object("sphere", &sphere, material).at([x, 0.3005, z]);
-    }
-    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
-    scene
-}
-
-/// The same room with spheres of satin and of polished metal and of plastic, rough and smooth.
-fn glossy() -> Document {
-    four_spheres(
-        "glossy",
-        [
-            metallic_roughness("satin", [0.95, 0.7, 0.4], 1.0, 0.5),
-            metallic_roughness("polished", [0.9, 0.9, 0.92], 1.0, 0.2),
-            metallic_roughness("plastic", [0.15, 0.3, 0.7], 0.0, 0.35),
-            metallic_roughness("lacquer", [0.6, 0.08, 0.06], 0.0, 0.0),
-        ],
-    )
-}
-
-/// The same room with spheres of tinted, frosted, thin and half clear glass.
-fn glasses() -> Document {
-    four_spheres(
-        "glasses",
-        [
-            glass("tinted", 0.0, 1.0, Some(([0.1, 0.6, 0.3], 0.4))),
-            glass("frosted", 0.35, 1.0, Some(([1.0; 3], 1.0))),
-            glass("thin", 0.0, 1.0, None),
-            glass("half-clear", 0.2, 0.6, Some(([0.9, 0.7, 0.2], 0.5))),
-        ],
-    )
 }
 
 /// A golden ring on a table, lit from the side: the cardioid caustic.
@@ -181,6 +128,67 @@ fn tile_png() -> Vec<u8> {
     })
 }
 
+/// Normals of a round stud.
+fn stud_png() -> Vec<u8> {
+    png(32, 32, |x, y| {
+        let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
+        let (x, y) = (at(x), -at(y));
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+        let normal = if z > 0.5 { [x, y, z] } else { [0.0, 0.0, 1.0] };
+        let [r, g, b] = normal.map(|value| (127.5 + 127.5 * value).round() as u8);
+        [r, g, b, 255]
+    })
+}
+
+/// The same room with a few meshes that many nodes show: turned, stretched, mirrored, in turned and stretched groups; glass
+/// that stands on the floor, and one in the other.
+fn instances() -> Document {
+    const UP: [f64; 3] = [0.0, 1.0, 0.0];
+    let tilted = DVec3::new(1.0, 2.0, 2.0).normalize().to_array();
+    let mut scene = cornell_room("instances");
+    let studs = scene.texture(&stud_png(), Filter::Linear);
+    let tiles = scene.texture(&tile_png(), Filter::Nearest);
+    let studded = metallic_roughness("studded", [0.9, 0.7, 0.5], 0.0, 0.4);
+    let studded = with_texture(studded, "/normalTexture", studs);
+    let studded = scene.material(with_texture(studded, "/pbrMetallicRoughness/baseColorTexture", tiles));
+    let mut ball = Mesh::icosphere(0.25, 2);
+    let place = |p: &DVec3| dvec2(2.0 * p.x.atan2(p.z), 4.0 * p.y) * 2.0;
+    ball.texcoords = ball.positions.iter().map(place).collect();
+    scene.object("ball", &ball, studded).at([-0.6, 1.0, -0.5]);
+    let ball = scene.last_mesh();
+    let mut mirrored = scene.again("mirrored", ball);
+    mirrored
+        .at([0.0, 1.1, -0.6])
+        .rotated(tilted, 0.7)
+        .scaled([-1.0, 1.0, 1.0]);
+    let mut egg = scene.again("egg", ball);
+    egg.at([0.6, 1.0, -0.5]).rotated(tilted, 2.0).scaled([0.7, 1.5, 0.9]);
+    scene.again("left", ball).at([-0.4, 0.0, 0.0]).rotated(tilted, 1.0);
+    scene.again("right", ball).at([0.4, 0.0, 0.0]).scaled([0.8, -0.8, 0.8]);
+    let mut pair = scene.group("pair", 2);
+    pair.at([0.0, 0.4, -0.2]).rotated(UP, 0.3).scaled([1.2, 0.6, 0.8]);
+
+    let white = scene.material(matte("hoop", WHITE));
+    scene.object("hoop", &Mesh::ring(0.2, 0.24, -0.04, 0.04, 24), white);
+    let hoop = scene.last_mesh();
+    scene
+        .again("smaller", hoop)
+        .rotated([0.0, 0.0, 1.0], 1.2)
+        .scaled([0.7, 0.7, 0.7]);
+    let mut hoops = scene.group("hoops", 2);
+    hoops.at([0.1, 0.3, 0.5]).rotated([1.0, 0.0, 0.0], 0.9);
+
+    let glass = scene.material(clear("glass", 1.5));
+    scene
+        .object("glass", &Mesh::ring(0.12, 0.25, 0.0, 0.16, 20), glass)
+        .at([-0.55, 0.0, 0.5]);
+    let glass = scene.last_mesh();
+    let mut other = scene.again("other glass", glass);
+    other.at([0.6, 0.0, 0.5]).rotated(UP, 0.5).scaled([1.0, 1.5, 0.7]);
+    scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
+    scene
+}
+
 /// The same room with a checkered floor, a wall of studs, a fence, a pane of smoke, a ball of metal and plaster, and a lamp of
 /// two colours: every kind of texture.
 fn textures() -> Document {
@@ -196,7 +204,7 @@ fn textures() -> Document {
         }),
         Filter::Nearest,
     );
-    let studs = scene.texture(&studs_png(), Filter::Linear);
+    let studs = scene.texture(&stud_png(), Filter::Linear);
     let fence = scene.texture(
         &png(8, 8, |x, y| [120, 90, 50, if x % 4 == 0 || y == 4 { 255 } else { 0 }]),
         Filter::Nearest,
@@ -259,65 +267,6 @@ fn textures() -> Document {
     scene
 }
 
-/// The normals of half a sphere on a plane, 32 × 32 texels.
-fn studs_png() -> Vec<u8> {
-    png(32, 32, |x, y| {
-        let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
-        let (x, y) = (at(x), -at(y));
-        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
-        let normal = if z > 0.5 { [x, y, z] } else { [0.0, 0.0, 1.0] };
-        let [r, g, b] = normal.map(|value| (127.5 + 127.5 * value).round() as u8);
-        [r, g, b, 255]
-    })
-}
-
-/// A grey sphere in a box of radiance 1.
-fn furnace_diffuse() -> Document {
-    let mut scene = furnace("furnace-diffuse");
-    let grey = scene.material(one_sided(matte("grey", [0.5; 3])));
-    scene.object("diffuse", &Mesh::icosphere(0.5, 4), grey);
-    scene.camera([0.0, 2.9], [0.0, 0.0], 60.0);
-    scene
-}
-
-/// A glass and a mirror sphere, neither of which absorbs, in a box of radiance 1.
-fn furnace_specular() -> Document {
-    let mut scene = furnace("furnace-specular");
-    let glass = scene.material(clear("glass", 1.5));
-    let mirror = scene.material(mirror("mirror", [1.0; 3]));
-    let sphere = Mesh::icosphere(0.5, 4);
-    scene.object("glass", &sphere, glass).at([-0.7, 0.0, 0.0]);
-    scene.object("mirror", &sphere, mirror).at([0.7, 0.0, 0.0]);
-    scene.camera([0.0, 2.9], [0.0, 0.0], 60.0);
-    scene
-}
-
-/// A closed matte room whose six sides emit Le and reflect ρ: radiance is Le / (1 − ρ) everywhere.
-fn furnace_closed() -> Document {
-    const ALBEDO: [f64; 3] = [0.2, 0.5, 0.8];
-    const EMISSION: [f64; 3] = [1.0; 3];
-    let mut scene = Document::new("furnace-closed");
-    let wall = scene.material(emitting(matte("wall", ALBEDO), EMISSION));
-    scene.object("floor", &Mesh::facing_up(ROOM, 0.0), wall);
-    for (name, mesh) in walls(2.0) {
-        scene.object(name, &mesh, wall);
-    }
-    scene.object("ceiling", &Mesh::facing_down(ROOM, 2.0), wall);
-    scene.camera([1.0, 0.9], [1.0, 0.0], 90.0);
-    scene
-}
-
-/// A square light above a floor, for which irradiance has a closed form.
-fn light_area() -> Document {
-    let mut scene = Document::new("light-area");
-    let grey = scene.material(matte("grey", [0.5; 3]));
-    let lamp = scene.material(light("light", [10.0, 5.0, 2.5]));
-    scene.object("floor", &Mesh::facing_up(2.0, 0.0), grey);
-    scene.object("light", &Mesh::facing_down(0.5, 2.0), lamp);
-    scene.camera([1.8, 1.8], [0.0, 0.0], 40.0);
-    scene
-}
-
 /// A glass and a matte sphere under a lamp, a spotlight and the sun, none of which has an extent.
 fn lights() -> Document {
     let mut scene = Document::new("lights");
@@ -359,7 +308,7 @@ fn plaza() -> Document {
         let material = scene.material(material);
         scene.object("sphere", &sphere, material).at([x, 0.4005, z]);
     }
-    let studs = scene.texture(&studs_png(), Filter::Linear);
+    let studs = scene.texture(&stud_png(), Filter::Linear);
     let studded = metallic_roughness("studded", [0.8, 0.7, 0.6], 0.0, 0.5);
     let mut studded = with_texture(studded, "/normalTexture", studs);
     studded["normalTexture"]["extensions"] =
@@ -389,26 +338,6 @@ fn plaza() -> Document {
     scene
 }
 
-/// A black room with a luminous ceiling and a grey floor, part of which lies under water.
-fn slab() -> Document {
-    const HEIGHT: f64 = 2.0;
-    let mut scene = Document::new("slab");
-    let grey = scene.material(matte("grey", [0.5; 3]));
-    let black = scene.material(matte("black", BLACK));
-    let lamp = scene.material(light("light", [1.0; 3]));
-    let water = scene.material(clear("water", 1.33));
-    scene.object("floor", &Mesh::facing_up(ROOM, 0.0), grey);
-    for (name, wall) in walls(HEIGHT) {
-        scene.object(name, &wall, black);
-    }
-    scene.object("ceiling", &Mesh::facing_down(ROOM, HEIGHT), lamp);
-    let reach = ROOM + 0.03;
-    let body = Mesh::cuboid(dvec3(-0.5, -0.03, -reach), dvec3(reach, 0.4, reach));
-    scene.object("water", &body, water);
-    scene.camera([1.7, 0.6], [0.2, 0.0], 60.0);
-    scene
-}
-
 /// The Cornell box without what stands in it.
 fn cornell_room(name: &'static str) -> Document {
     const HEIGHT: f64 = 2.0;
@@ -424,15 +353,6 @@ fn cornell_room(name: &'static str) -> Document {
         scene.object(name, &wall, material);
     }
     scene.object("light", &Mesh::facing_down(0.25, HEIGHT - 0.002), lamp);
-    scene
-}
-
-/// A box of 6 m with walls of radiance 1 that reflect nothing.
-fn furnace(name: &'static str) -> Document {
-    let mut scene = Document::new(name);
-    let environment = scene.material(light("env", [1.0; 3]));
-    let walls = Mesh::cuboid(DVec3::splat(-3.0), DVec3::splat(3.0)).flipped();
-    scene.object("env", &walls, environment);
     scene
 }
 

@@ -1,0 +1,80 @@
+// What narrow lobes show of lights without extent, which no direction of theirs meets. Include after alpha.glsl, bsdf.glsl,
+// contact.glsl and light.glsl.
+
+// BSDF · cos of a rough boundary of glass without its tint, as `meet_boundary` draws it: Walter and others, «Microfacet Models for Refraction
+// through Rough Surfaces», EGSR 2007. v and l are unit vectors away from the surface.
+vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outside) {
+    vec3 n = facing.shading_normal;
+    float alpha = material.roughness * material.roughness;
+    float ior = material.ior / outside;
+    bool thin = is_thin(material);
+    float eta = facing.front || thin ? 1.0 / ior : ior;
+    bool passes = dot(l, facing.geometric_normal) < 0.0;
+    bool bends = passes && !thin;
+    vec3 h = bends ? eta * v + l : v + (passes ? l - 2.0 * dot(l, n) * n : l);
+    float length2 = dot(h, h);
+    h *= (dot(h, n) < 0.0 ? -1.0 : 1.0) * inversesqrt(max(length2, 1e-12));
+    float nv = dot(n, v);
+    float nl = dot(n, l);
+    float vh = dot(v, h);
+    float lh = dot(l, h);
+    // Straight through without bending, any microfacet will do: that is no lobe.
+    if (nv <= 0.0 || vh <= 0.0 || (nl < 0.0) != passes || (bends && lh >= 0.0) || length2 < 1e-12) {
+        return vec3(0.0);
+    }
+    float cos_t;
+    Boundary boundary;
+    boundary.reflectance = fresnel_dielectric(vh, eta, cos_t);
+    boundary.refracted = l;
+    boundary.reflected_weight = vec3(1.0);
+    boundary.refracted_weight = vec3(1.0);
+    weigh(boundary, facing, -v, material, ior);
+    float visible = 2.0 * ggx(alpha, n, h) / (nv + masking_root(alpha, nv)); // D · G1(v) / nv
+    if (!passes) {
+        return boundary.reflectance * boundary.reflected_weight * (0.25 * visible * joint_masking(alpha, nv, nl));
+    }
+    // Density of l against that of h; radiance is compressed on its way into the denser medium.
+    float through = bends ? vh * -lh * eta * eta / ((eta * vh + lh) * (eta * vh + lh)) : 0.25;
+    float masking = 2.0 * -nl / (-nl + masking_root(alpha, -nl));
+    return boundary.refracted_weight * ((1.0 - boundary.reflectance) * visible * through * masking);
+}
+
+// By a ray to one of the lights or, where visible points are found once, to each. `reflector`: of what isn't glass.
+vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector, vec3 viewer, inout Random random) {
+    vec4 u = next4(random);
+    uint chosen = choose_light(u.x, u.yz).light;
+    bool of_one = settings.slots_per_pixel == 1u;
+    uint begin = of_one ? chosen : 0u;
+    uint end = of_one ? chosen + 1u : settings.light_count;
+    reflector.diffuse = vec3(0.0);
+    vec3 sum = vec3(0.0);
+    for (uint i = begin; i < end && !loops_cut; i++) {
+        Light light = light_at(i);
+        if (!is_punctual(light.kind)) {
+            continue;
+        }
+        PunctualLight lamp = punctual_light_at(i);
+        vec3 origin = origin_towards(met.surface, arriving_from(lamp, light.kind, met.surface.position).ray);
+        Arriving arriving = arriving_from(lamp, light.kind, origin);
+        vec3 l = normalize(arriving.ray);
+        float nl = dot(l, facing.shading_normal);
+        bool same_side = dot(l, facing.geometric_normal) > 0.0;
+        vec3 response = vec3(0.0);
+        if (is_dielectric(material)) {
+            response = glass_response(facing, viewer, l, material, met.outside) * (same_side ? vec3(1.0) : met.tint);
+            if (ABSORPTION) {
+                float way = light.kind == DIRECTIONAL_LIGHT ? 1e30 : length(arriving.ray);
+                response *= transmittance(same_side ? met.through : met.beyond, way);
+            }
+        } else if (same_side && nl > 0.0) {
+            response = brdf(reflector, facing.shading_normal, viewer, l) * nl;
+        }
+        response *= arriving.irradiance / (of_one ? light.probability : 1.0);
+        bool seen = largest(response) > 0.0;
+        if (seen) {
+            seen = trace_visible(origin, arriving.ray, arriving.end, NO_TRIANGLE, true, random).triangle == MISS;
+        }
+        sum += seen ? response : vec3(0.0);
+    }
+    return sum;
+}

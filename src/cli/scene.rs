@@ -1,0 +1,79 @@
+//! What the commands that read a scene have in common.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::Args;
+
+use super::args::number;
+use super::progress::{READING, while_showing};
+use crate::scene::{Environment, LoadOptions, Scene};
+
+/// How a scene's file is read.
+#[derive(Debug, Args)]
+pub struct SceneArguments {
+    /// Light from all around the scene: an equirectangular picture (.hdr or .exr) or one radiance (R,G,B) [default: none, or
+    /// 1,1,1 for a scene without any light].
+    #[arg(long, value_name = "FILE|R,G,B", value_parser = environment)]
+    environment: Option<EnvironmentChoice>,
+    /// Apply the scene's animations at this time, in seconds [default: everything at rest].
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = frame_time)]
+    frame_time: Option<f64>,
+}
+
+/// What `--environment` asks for.
+#[derive(Debug, Clone, PartialEq)]
+enum EnvironmentChoice {
+    /// One radiance, linear RGB.
+    Constant([f32; 3]),
+    /// A picture.
+    Picture(PathBuf),
+}
+
+impl SceneArguments {
+    /// The files that are read, with the scene's.
+    pub fn inputs<'a>(&'a self, scene: &'a Path) -> Vec<&'a Path> {
+        let mut inputs = vec![scene];
+        if let Some(EnvironmentChoice::Picture(picture)) = &self.environment {
+            inputs.push(picture);
+        }
+        inputs
+    }
+
+    /// Reads the scene.
+    pub fn load(&self, path: &Path, quiet: bool) -> Result<Scene> {
+        let environment = match &self.environment {
+            None => None,
+            Some(EnvironmentChoice::Constant(radiance)) => Some(Environment::constant((*radiance).into())),
+            Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture)?),
+        };
+        let options = LoadOptions {
+            frame_time: self.frame_time,
+            environment,
+        };
+        Ok(while_showing(READING, quiet, || Scene::load_with(path, options))?)
+    }
+}
+
+/// Three numbers, or else the name of a file.
+fn environment(text: &str) -> Result<EnvironmentChoice, String> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let Some(Ok(radiance)) = numbers.map(<[f32; 3]>::try_from) else {
+        return Ok(EnvironmentChoice::Picture(text.into()));
+    };
+    let is_radiance = radiance.iter().all(|value| value.is_finite() && *value >= 0.0);
+    if is_radiance && radiance != [0.0; 3] {
+        Ok(EnvironmentChoice::Constant(radiance))
+    } else {
+        Err("a radiance must be finite and not negative, and above 0 in one channel".to_owned())
+    }
+}
+
+fn frame_time(text: &str) -> Result<f64, String> {
+    let time = number(text)?;
+    if time.is_finite() {
+        Ok(time)
+    } else {
+        Err("must be finite".to_owned())
+    }
+}
