@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::Inputs;
 use super::boundary::{Boundary, fresnel_dielectric};
 use super::contact::{Encounter, transmittance};
 use super::gloss::Reflector;
@@ -11,6 +10,7 @@ use super::light::{Arriving, arriving_from, choose_light, is_punctual};
 use super::random::Random;
 use super::surface::{DIELECTRIC, Facing};
 use super::texture::nearest_visible;
+use super::{FAR, Inputs};
 use crate::layout::{DIRECTIONAL_LIGHT, Light, Material};
 
 /// By a ray to one of the lights or, where visible points are found once, to each.
@@ -43,7 +43,7 @@ pub(super) fn glint(
         let response = if material.surface == DIELECTRIC {
             let medium = if same_side { met.through } else { met.beyond };
             let is_far = light.kind == DIRECTIONAL_LIGHT;
-            let way = if is_far { f64::INFINITY } else { ray.length() };
+            let way = if is_far { FAR } else { ray.length() };
             glass_response(facing, reflector, incoming, direction, material, met.outside)
                 * if same_side { DVec3::ONE } else { met.tint }
                 * transmittance(inputs, medium, way)
