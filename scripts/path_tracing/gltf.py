@@ -63,6 +63,10 @@ class Material:
         """Glass with an inside."""
         return self.is_clear() and not self.is_thin
 
+    def hides_back(self):
+        """Whether cameras look through its back. Glass is seen from both sides."""
+        return not self.double_sided and not self.is_clear()
+
     def is_specular(self):
         """Whether it has a smooth boundary: light reaches it from one direction alone."""
         is_glossy = self.metallic > 0 or self.specular > 0 and self.ior != 1

@@ -51,6 +51,8 @@ class Look:
             self.textures["specular"] = bitmap(material.textures["specular"], "alpha")
 
     def add_attributes(self, shape, mesh):
+        hidden = np.full(mesh.positions.size // 3, self.material.hides_back(), np.float32)
+        shape.add_attribute("vertex_hidden", 1, hidden)
         if self.has_color:
             shape.add_attribute("vertex_color", 3, mesh.colors[..., :3].ravel().astype(np.float32))
             shape.add_attribute("vertex_opacity", 1, mesh.colors[..., 3].ravel().astype(np.float32))

@@ -14,6 +14,10 @@ LANES = 1 << 20
 ROULETTE_DEPTH = 5
 
 
+# Hidden surfaces before one another that a camera looks through.
+HIDDEN = 4
+
+
 class Part:
     """A sum of samples for some of the pixels, all of one kind."""
 
@@ -119,6 +123,12 @@ def primary_rays(scene, pixels, samples, offsets):
     corner = mi.Point2f(pixel % width, pixel // width)
     position = (corner + offsets) / mi.Point2f(width, height)
     ray, _ = sensor.sample_ray_differential(0, 0, position, mi.Point2f(0.5))
+    # As in ppm-vk, cameras look through the backs of surfaces with one side; light doesn't.
+    for _ in range(HIDDEN):
+        si = scene.ray_intersect(mi.Ray3f(ray))
+        is_back = si.is_valid() & (dr.dot(ray.d, si.n) > 0)
+        is_hidden = is_back & (si.shape.eval_attribute_1("vertex_hidden", si, is_back) > 0.5)
+        ray.o = dr.select(is_hidden, si.spawn_ray(ray.d).o, ray.o)
     return ray
 
 

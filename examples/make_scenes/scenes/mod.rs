@@ -313,6 +313,7 @@ fn plaza() -> Document {
     let mut studded = with_texture(studded, "/normalTexture", studs);
     studded["normalTexture"]["extensions"] =
         json!({ "KHR_texture_transform": { "scale": [1.0, 2.0], "offset": [0.1, 0.2], "rotation": 0.3 } });
+    studded["doubleSided"] = true.into();
     let studded = scene.material(studded);
     let column = Mesh::column(0.5, 1.5, 24, 6.0);
     scene.object("column", &column, studded).at([-0.5, 0.001, -0.7]);
