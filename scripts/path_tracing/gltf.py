@@ -231,7 +231,8 @@ class Reader:
         light = self.json["extensions"]["KHR_lights_punctual"]["lights"][index]
         spot = light.get("spot", {})
         angles = spot.get("innerConeAngle", 0.0), spot.get("outerConeAngle", np.pi / 4)
-        direction = -to_world[:3, 2]
+        # As of a camera, the node's scale turns nothing round.
+        direction = -to_world[:3, 2] * np.sign(node.get("scale", [1, 1, 1]))[2]
         return Light(
             name=light.get("name", node.get("name", f"light {index}")),
             kind=light["type"],

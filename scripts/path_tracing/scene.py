@@ -119,7 +119,9 @@ class Punctual(mi.Emitter):
         self.position, self.axis = mi.Point3f(props["position"]), mi.Vector3f(props["direction"])
         self.intensity = mi.Color3f(props["intensity"])
         self.is_spot = props["is_spot"]
-        self.inner, self.outer = props["inner"], props["outer"]
+        # Edges as good as the same are a ten thousandth of the cone apart, as in ppm-vk.
+        self.outer = props["outer"]
+        self.inner = max(props["inner"], 1 - (1 - self.outer) * (1 - 1e-4))
         self.range = props["range"]
         self.m_flags = +mi.EmitterFlags.DeltaPosition
 
@@ -127,7 +129,7 @@ class Punctual(mi.Emitter):
         """Intensity."""
         if not self.is_spot:
             return self.intensity
-        ramp = dr.clip((dr.dot(direction, self.axis) - self.outer) / max(self.inner - self.outer, 1e-3), 0, 1)
+        ramp = dr.clip((dr.dot(direction, self.axis) - self.outer) / (self.inner - self.outer), 0, 1)
         return self.intensity * dr.square(ramp)
 
     def sample_direction(self, it, sample, active=True):
