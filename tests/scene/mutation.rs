@@ -142,6 +142,10 @@ fn rich() -> Fixture {
     room.set(&format!("/accessors/{texcoords}/normalized"), json!(true));
     room.set("/meshes/0/primitives/0/attributes/TEXCOORD_0", json!(texcoords));
     room.set("/materials/0/normalTexture", json!({"index": 0}));
+    room.set(
+        "/materials/0/extensions/KHR_materials_clearcoat",
+        json!({"clearcoatFactor": 0.5, "clearcoatNormalTexture": {"index": 0, "scale": 0.5}}),
+    );
     room.set("/textures", json!([{}]));
     let colors = room.add_floats("VEC4", 4, &[0.5; 12]);
     room.set("/meshes/1/primitives/0/attributes/COLOR_0", json!(colors));
