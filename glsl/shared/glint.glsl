@@ -1,6 +1,9 @@
 // What narrow lobes show of lights without extent, which no direction of theirs meets. Include after alpha.glsl, bsdf.glsl,
 // contact.glsl and light.glsl.
 
+// Of 65,536 numbers of faces that a ray passes, the last.
+const uint FIRST_OF_GLINT = 65520u;
+
 // BSDF · cos of a rough boundary of glass without its tint, as `meet_boundary` draws it: Walter and others, «Microfacet Models for Refraction
 // through Rough Surfaces», EGSR 2007. v and l are unit vectors away from the surface.
 vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outside) {
@@ -40,8 +43,10 @@ vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outs
 }
 
 // By a ray to one of the lights or, where visible points are found once, to each. `reflector`: of what isn't glass.
-vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector, vec3 viewer, inout Random random) {
-    vec4 u = next4(random);
+vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector, vec3 viewer, Random random) {
+    // Apart from the path's own numbers: those are the same where there is nothing to ask.
+    vec3 u = vec3(of_passage(random, FIRST_OF_GLINT), of_passage(random, FIRST_OF_GLINT + 1u),
+                  of_passage(random, FIRST_OF_GLINT + 2u));
     uint chosen = choose_light(u.x, u.yz).light;
     bool of_one = settings.slots_per_pixel == 1u;
     uint begin = of_one ? chosen : 0u;

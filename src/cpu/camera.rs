@@ -259,7 +259,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let [choice, second, third, _] = random.next4();
             if is_glossy {
                 if inputs.scene.features.punctual && !reflector.is_smooth() {
-                    let seen = glint(inputs, &met, &material, &facing, &reflector, incoming, &mut random);
+                    let seen = glint(inputs, &met, &material, &facing, &reflector, incoming, &random);
                     branch.emitted += branch.throughput * seen;
                 }
                 let p = reflector.reflection_probability(-incoming.dot(facing.shading_normal));
@@ -300,7 +300,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 branch.throughput *= disperse(&mut material, &mut branch.wavelength, &mut random);
                 let microfacets = reflector.with_alpha(f64::from(material.roughness).powi(2));
                 if inputs.scene.features.punctual && !microfacets.is_smooth() {
-                    let seen = glint(inputs, &met, &material, &facing, &microfacets, incoming, &mut random);
+                    let seen = glint(inputs, &met, &material, &facing, &microfacets, incoming, &random);
                     branch.emitted += branch.throughput * seen;
                 }
                 let boundary = Boundary::new(&facing, incoming, &material, met.outside, [second, third]);

@@ -13,6 +13,9 @@ use super::texture::nearest_visible;
 use super::{FAR, Inputs};
 use crate::layout::{DIRECTIONAL_LIGHT, Light, Material};
 
+/// Of 65,536 numbers of faces that a ray passes, the last.
+const FIRST_OF_GLINT: u32 = 65_520;
+
 /// By a ray to one of the lights or, where visible points are found once, to each.
 pub(super) fn glint(
     inputs: &Inputs<'_>,
@@ -21,9 +24,10 @@ pub(super) fn glint(
     facing: &Facing,
     reflector: &Reflector,
     incoming: DVec3,
-    random: &mut Random,
+    random: &Random,
 ) -> DVec3 {
-    let [u, first_digits, second_digits, _] = random.next4();
+    // Apart from the path's own numbers: those are the same where there is nothing to ask.
+    let [u, first_digits, second_digits] = [0, 1, 2].map(|number| random.of_passage(FIRST_OF_GLINT + number));
     let lights = &inputs.scene.lights;
     let chosen = choose_light(lights, u, [first_digits, second_digits]).light;
     let of_one = inputs.settings.slots_per_pixel == 1;
