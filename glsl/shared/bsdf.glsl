@@ -171,7 +171,7 @@ Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float ou
         float up = dot(incoming + 2.0 * cos_i * m, n);
         float down = -dot(boundary.refracted, n);
         boundary.reflected_weight = vec3(up > 0.0 ? joint_masking(alpha, nv, up) : 0.0);
-        boundary.refracted_weight = vec3(down > 0.0 ? 2.0 * down / (down + masking_root(alpha, down)) : 0.0);
+        boundary.refracted_weight = vec3(down > 0.0 ? masking(alpha, down) : 0.0);
     }
     weigh(boundary, facing, incoming, material, ior, cos_i);
     return boundary;

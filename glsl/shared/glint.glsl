@@ -38,8 +38,7 @@ vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outs
     }
     // Density of l against that of h; radiance is compressed on its way into the denser medium.
     float through = bends ? vh * -lh * eta * eta / ((eta * vh + lh) * (eta * vh + lh)) : 0.25;
-    float masking = 2.0 * -nl / (-nl + masking_root(alpha, -nl));
-    return boundary.refracted_weight * ((1.0 - boundary.reflectance) * visible * through * masking);
+    return boundary.refracted_weight * ((1.0 - boundary.reflectance) * visible * through * masking(alpha, -nl));
 }
 
 // By a ray to one of the lights or, where visible points are found once, to each. `reflector`: of what isn't glass.

@@ -81,6 +81,11 @@ float masking_root(float alpha, float cosine) {
     return sqrt(a2 + (1.0 - a2) * cosine * cosine);
 }
 
+// G1: the share of what a direction sees of microfacets.
+float masking(float alpha, float cosine) {
+    return 2.0 * cosine / (cosine + masking_root(alpha, cosine));
+}
+
 // G2 / G1(v): the share of the light that v's visible normals reflect that isn't held back on its way out.
 float joint_masking(float alpha, float nv, float nl) {
     float root_v = masking_root(alpha, nv);

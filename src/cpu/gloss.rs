@@ -15,7 +15,7 @@ pub const SMOOTH_ALPHA: f64 = 1e-3;
 /// Below this α camera paths follow reflections.
 pub(super) const FOLLOWED_ALPHA: f64 = 0.1;
 
-fn schlick(cosine: f64) -> f64 {
+pub(super) fn schlick(cosine: f64) -> f64 {
     (1.0 - cosine).clamp(0.0, 1.0).powi(5)
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use super::gloss::{COAT_F0, Reflector, coat_passes};
+use super::gloss::{COAT_F0, Reflector, coat_passes, schlick};
 use super::intersect::{Hit, PlacedTriangle};
 use super::sampling::decode_direction;
 use super::vector::{rgb, word};
@@ -252,7 +252,7 @@ impl Facing {
         let f0 = rgb(material.base_color);
         let cosine = -incoming.dot(self.shading_normal);
         let passes = coat_passes(f64::from(material.coat), cosine);
-        passes * (f0 + (1.0 - f0) * (1.0 - cosine).clamp(0.0, 1.0).powi(5))
+        passes * (f0 + (1.0 - f0) * schlick(cosine))
     }
 
     /// What the shading normal's cosine makes of a photon's flux, which is per area of the geometric surface: Veach, «Robust
