@@ -9,12 +9,20 @@
 //! density is even or falls evenly that sum vanishes, where it bends it is a third of what the blur adds, with the opposite
 //! sign. (Hachisuka and others, «A Progressive Error Estimation Framework for Photon Density Estimation», 2010, have the same
 //! two parts, and derivatives from a kernel of their own.)
+//!
+//! The paper's estimator looks through the centres of pixels for ever. What that leaves out is told from how much pixels
+//! differ from their neighbours ([`Parts`]).
+
+mod parts;
+
+use rayon::prelude::*;
 
 use crate::backend::{Backend, Resolved};
-use crate::config::RenderConfig;
+use crate::config::{Estimator, RenderConfig};
 use crate::film::Image;
 use crate::metrics::REL_MSE_FLOOR;
 use crate::scene::PackedScene;
+use parts::{OfPixel, Parts};
 
 /// Batches at the most; then neighbours are joined. Even, so that the halves are alike.
 const MOST_BATCHES: usize = 8;
@@ -28,6 +36,8 @@ const BIAS_PER_CURVATURE: f64 = 4.05;
 #[derive(Debug)]
 pub struct ErrorEstimate {
     alpha: f64,
+    /// Whether pixels are seen through their centres alone.
+    sees_centres: bool,
     /// Radiance that a photon gives a pixel in an iteration, see [`of_one_photon`].
     photon: f64,
     /// Iterations of a batch.
@@ -43,8 +53,22 @@ pub struct RelativeError {
     pub total: f64,
     /// By noise.
     pub noise: f64,
-    /// By bias.
+    /// By the blur of the radius.
     pub bias: f64,
+    /// By looking through the centres of pixels alone, which [`Estimator::Ppm`] does.
+    pub aliasing: f64,
+}
+
+impl std::fmt::Display for RelativeError {
+    fn fmt(&self, text: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [total, noise, bias, aliasing] =
+            [self.total, self.noise, self.bias, self.aliasing].map(|part| format!("{:.2} %", 100.0 * part));
+        write!(text, "relative error about {total} (noise {noise}, bias {bias}")?;
+        if self.aliasing > 0.0 {
+            write!(text, ", centres of pixels alone {aliasing}")?;
+        }
+        text.write_str(")")
+    }
 }
 
 /// Radiance that a photon of average power gives a white surface in one iteration, at the initial radius. That none has come
@@ -54,48 +78,12 @@ pub fn of_one_photon(scene: &PackedScene, backend: &dyn Backend, config: &Render
     scene.power / f64::from(config.photons) / (std::f64::consts::PI.powi(2) * radius2)
 }
 
-/// The squared errors of each pixel after some iterations.
-struct Parts {
-    /// Of each channel, as the last picture has it.
-    values: Vec<[f64; 3]>,
-    /// Of each channel.
-    noise2: Vec<[f64; 3]>,
-    /// Of the mean of the channels; of noise alone it is 0 on average.
-    bias2: Vec<f64>,
-    /// relMSE's denominator beside the square.
-    floor: f64,
-}
-
-impl Parts {
-    /// A channel's bias is in proportion to its value; its square over the pixel's.
-    fn share2(values: &[f64; 3]) -> [f64; 3] {
-        let mean = values.iter().sum::<f64>() / 3.0;
-        values.map(|value| if mean > 0.0 { (value / mean).powi(2) } else { 0.0 })
-    }
-
-    /// Part of relMSE of these squared biases.
-    fn relative_bias2(&self, bias2: &[f64]) -> f64 {
-        let of_pixel = |(values, bias2): (&[f64; 3], &f64)| {
-            let shares = Self::share2(values).into_iter().zip(values);
-            let weighed: f64 = shares.map(|(share, value)| share / (value * value + self.floor)).sum();
-            bias2 * weighed
-        };
-        self.values.iter().zip(bias2).map(of_pixel).sum::<f64>() / (3 * self.values.len()) as f64
-    }
-
-    /// Part of relMSE of the noise.
-    fn relative_noise2(&self) -> f64 {
-        let pairs = self.values.as_flattened().iter().zip(self.noise2.as_flattened());
-        let sum: f64 = pairs.map(|(value, noise2)| noise2 / (value * value + self.floor)).sum();
-        sum / (3 * self.values.len()) as f64
-    }
-}
-
 impl ErrorEstimate {
-    /// Before the first iteration of a render with eq. 2's α; `photon` is [`of_one_photon`].
-    pub fn new(alpha: f32, photon: f64) -> Self {
+    /// Before the first iteration of a render; `photon` is [`of_one_photon`].
+    pub fn new(config: &RenderConfig, photon: f64) -> Self {
         Self {
-            alpha: f64::from(alpha),
+            alpha: f64::from(config.alpha),
+            sees_centres: config.estimator == Estimator::Ppm,
             photon,
             batch: 1,
             pictures: Vec::new(),
@@ -130,103 +118,126 @@ impl ErrorEstimate {
         (self.pictures.len() >= FEWEST_BATCHES).then_some(&self.pictures)
     }
 
-    /// Mean of the batches and its squared standard error, from the values of the pictures after 1, 2, … of them.
-    fn mean_and_noise2(cumulative: impl Fn(usize) -> f32, count: usize) -> (f64, f64) {
-        let sum = |batches: usize| match batches {
-            0 => 0.0,
-            n => f64::from(cumulative(n - 1)) * n as f64,
-        };
-        let mean = sum(count) / count as f64;
-        let squares: f64 = (0..count).map(|n| (sum(n + 1) - sum(n) - mean).powi(2)).sum();
-        (mean, squares / (count * (count - 1)) as f64)
-    }
-
     /// What is known after so many iterations; `None` before there are enough, and while the picture is black.
     fn parts(&self, iterations: u32) -> Option<Parts> {
         let pictures = self.batches()?;
-        let count = pictures.len();
-        // Since the last picture the noise has fallen as n^−α, the bias as n^(α−1).
-        let taken = f64::from(self.batch) * count as f64;
-        let since = f64::from(iterations.max(1)) / taken;
-        let (fallen_noise, fallen_bias) = (since.powf(-self.alpha), since.powf(2.0 * (self.alpha - 1.0)));
-        let photon2 = (self.photon / taken).powi(2);
-        let mut parts = Parts {
-            values: Vec::new(),
-            noise2: Vec::new(),
-            bias2: Vec::new(),
-            floor: 0.0,
-        };
-        for (pixel, last) in pictures[count - 1].curvature.iter().enumerate() {
-            let without_photons = last.is_infinite();
-            let channels = [0, 1, 2]
-                .map(|channel: usize| Self::mean_and_noise2(|n| pictures[n].image.pixels()[pixel][channel], count));
-            let (curvature, curvature_noise2) = Self::mean_and_noise2(
-                |n| {
-                    let curvature = pictures[n].curvature[pixel];
-                    if curvature.is_finite() { curvature } else { 0.0 }
-                },
-                count,
-            );
-            parts.values.push(channels.map(|(value, _)| value));
-            parts.noise2.push(
-                channels.map(|(_, noise2)| (noise2 + if without_photons { photon2 } else { 0.0 }) * fallen_noise),
-            );
-            let bias2 = (curvature * curvature - curvature_noise2) * BIAS_PER_CURVATURE.powi(2);
-            parts.bias2.push(bias2 * fallen_bias);
+        let last = &pictures[pictures.len() - 1];
+        let floor = REL_MSE_FLOOR * parts::mean(&last.image).powi(2);
+        if floor <= 0.0 {
+            return None;
         }
-        let mean = parts.values.as_flattened().iter().sum::<f64>() / (3 * parts.values.len()) as f64;
-        parts.floor = REL_MSE_FLOOR * mean * mean;
-        (parts.floor > 0.0).then_some(parts)
+        // Since the last picture the noise has fallen as n^−α, the bias as n^(α−1).
+        let taken = f64::from(self.batch) * pictures.len() as f64;
+        let since = f64::from(iterations.max(1)) / taken;
+        let width = last.image.width();
+        let channel_of = |picture: &Resolved, pixel: usize, channel: usize| picture.image.pixels()[pixel][channel];
+        let around = [0, 1, 2].map(|channel| {
+            let values = (0..last.curvature.len()).map(|pixel| f64::from(channel_of(last, pixel, channel)));
+            parts::mean_around(&values.collect::<Vec<_>>(), width, false)
+        });
+        let of_pixel = |pixel: usize| {
+            let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
+            let curvature = Batches::of(pictures.iter().map(|picture| finite(picture.curvature[pixel])));
+            let without_photons = last.curvature[pixel].is_infinite();
+            let photon2 = if without_photons {
+                (self.photon / taken).powi(2)
+            } else {
+                0.0
+            };
+            let channels: [Batches; 3] = std::array::from_fn(|channel| {
+                Batches::of(pictures.iter().map(|picture| channel_of(picture, pixel, channel)))
+            });
+            OfPixel {
+                values: channels.each_ref().map(|batches| batches.mean),
+                noise2: channels.each_ref().map(|batches| batches.noise2() + photon2),
+                relative_noise2: std::array::from_fn(|channel| {
+                    let batches = &channels[channel];
+                    batches.relative_noise2(around[channel][pixel], floor) + photon2 / (batches.mean.powi(2) + floor)
+                }),
+                bias2: (curvature.mean.powi(2) - curvature.noise2()) * BIAS_PER_CURVATURE.powi(2),
+            }
+        };
+        Some(Parts {
+            width,
+            pixels: (0..last.curvature.len()).into_par_iter().map(of_pixel).collect(),
+            floor,
+            fallen: [since.powf(-self.alpha), since.powf(2.0 * (self.alpha - 1.0))],
+            sees_centres: self.sees_centres,
+        })
     }
 
     /// The estimate after so many iterations; `None` before there are enough, and while the picture is black.
     pub fn relative(&self, iterations: u32) -> Option<RelativeError> {
         let parts = self.parts(iterations)?;
         let noise2 = parts.relative_noise2();
-        let bias2 = parts.relative_bias2(&parts.bias2).max(0.0);
+        let [bias2, aliasing2] = [parts.relative_bias2(), parts.relative_aliasing2()].map(|part| part.max(0.0));
         Some(RelativeError {
-            total: (noise2 + bias2).sqrt(),
+            total: (noise2 + bias2 + aliasing2).sqrt(),
             noise: noise2.sqrt(),
             bias: bias2.sqrt(),
+            aliasing: aliasing2.sqrt(),
         })
     }
 
-    /// The error of each pixel by noise and bias, root of the mean square, in units of radiance; `None` as in
-    /// [`ErrorEstimate::relative`], whose error is that of all these together. A pixel's bias is that of the pixels around it:
-    /// its own is all but lost in noise.
+    /// The error of each pixel, root of the mean square, in units of radiance; `None` as in [`ErrorEstimate::relative`], of
+    /// whose error it is the parts. A pixel's bias is that of the pixels around it: its own is all but lost in noise.
     pub fn of_pixels(&self, iterations: u32) -> Option<Image> {
         let parts = self.parts(iterations)?;
         let last = &self.pictures.last()?.image;
-        let around: Vec<f64> = mean_around(&parts.bias2, last.width())
+        let errors = parts
+            .of_pixels()
             .into_iter()
-            .map(|bias2| bias2.max(0.0))
-            .collect();
-        // What noise made negative is missing: without this the picture's error were smaller than that of its pixels.
-        let [whole, of_pixels] = [&parts.bias2, &around].map(|bias2| parts.relative_bias2(bias2).max(0.0));
-        let scale = if of_pixels > 0.0 { whole / of_pixels } else { 0.0 };
-        let pixels = parts.values.iter().zip(&parts.noise2).zip(around);
-        let pixels = pixels.map(|((values, noise2), bias2)| {
-            let share2 = Parts::share2(values);
-            [0, 1, 2].map(|channel: usize| (noise2[channel] + scale * bias2 * share2[channel]).sqrt() as f32)
-        });
-        Some(Image::new(last.width(), last.height(), pixels.collect()))
+            .map(|error2| error2.map(|part| part.sqrt() as f32));
+        Some(Image::new(last.width(), last.height(), errors.collect()))
     }
 }
 
-/// Mean over the pixels that are no more than two columns or rows away.
-fn mean_around(values: &[f64], width: usize) -> Vec<f64> {
-    const REACH: usize = 2;
-    let height = values.len() / width;
-    let near = |at: usize, side: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(side);
-    let mean = |pixel: usize| {
-        let (columns, rows) = (near(pixel % width, width), near(pixel / width, height));
-        let count = columns.len() * rows.len();
-        let sum: f64 = rows
-            .map(|row| values[row * width..][columns.clone()].iter().sum::<f64>())
+/// One value of a pixel in each batch of iterations.
+struct Batches {
+    values: [f64; MOST_BATCHES],
+    count: usize,
+    mean: f64,
+}
+
+impl Batches {
+    /// From the pictures after 1, 2, … batches.
+    fn of(cumulative: impl Iterator<Item = f32>) -> Self {
+        let (mut values, mut count, mut sum) = ([0.0; MOST_BATCHES], 0, 0.0);
+        for (own, value) in values.iter_mut().zip(cumulative) {
+            count += 1;
+            let until_here = f64::from(value) * count as f64;
+            *own = until_here - sum;
+            sum = until_here;
+        }
+        let mean = sum / count as f64;
+        Self { values, count, mean }
+    }
+
+    /// Squared standard error of the mean, a batch's share of it divided by what `divisor` gives for the batch.
+    fn noise2_over(&self, divisor: impl Fn(f64) -> f64) -> f64 {
+        let count = self.count;
+        let squares: f64 = self.values[..count]
+            .iter()
+            .map(|value| (value - self.mean).powi(2) / divisor(*value))
             .sum();
-        sum / count as f64
-    };
-    (0..values.len()).map(mean).collect()
+        squares / (count * (count - 1)) as f64
+    }
+
+    /// Squared standard error of the mean.
+    fn noise2(&self) -> f64 {
+        self.noise2_over(|_| 1.0)
+    }
+
+    /// The same over relMSE's denominator. Light that comes seldom and is bright makes a pixel far too bright: over that
+    /// value's square its error would seem small. Each batch's part is therefore over what the other batches have of the
+    /// pixel, or the pixels around it if that is more, if it is less than what all have.
+    fn relative_noise2(&self, around: f64, floor: f64) -> f64 {
+        let count = self.count as f64;
+        self.noise2_over(|value| {
+            let others = (self.mean * count - value) / (count - 1.0);
+            others.max(around).min(self.mean).powi(2) + floor
+        })
+    }
 }
 
 #[cfg(test)]
@@ -238,11 +249,18 @@ mod tests {
         f64::from(crate::cpu::pcg4d([index, seed, 7, 11])[0]) / 4_294_967_296.0
     }
 
+    fn with_alpha(alpha: f32) -> RenderConfig {
+        RenderConfig {
+            alpha,
+            ..RenderConfig::default()
+        }
+    }
+
     /// A picture of 1 everywhere after so many iterations, with noise of this deviation in each, a bias of
     /// `bias`·i^(α−1) in iteration i, and the curvature that smooth light of that bias has, as noisy as the picture.
     fn rendered(iterations: u32, deviation: f64, bias: f64, alpha: f32) -> (ErrorEstimate, f64) {
         const PIXELS: usize = 2000;
-        let mut estimate = ErrorEstimate::new(alpha, 0.0);
+        let mut estimate = ErrorEstimate::new(&with_alpha(alpha), 0.0);
         let mut sums = vec![[0.0f64; 4]; PIXELS];
         let mut last = Vec::new();
         for i in 1..=iterations {
@@ -272,6 +290,81 @@ mod tests {
             assert!(
                 (found.noise / truth - 1.0).abs() < 0.12,
                 "{iterations} iterations: {found:?}, the truth is {truth}"
+            );
+        }
+    }
+
+    #[test]
+    fn light_that_comes_seldom_and_is_bright_counts_against_what_pixels_have_without_it() {
+        const SIDE: usize = 100;
+        const ITERATIONS: u32 = 16;
+        let mut estimate = ErrorEstimate::new(&RenderConfig::default(), 0.0);
+        let mut sums = vec![0.0; SIDE * SIDE];
+        // One look in 200 brings 100 beside the 1 that there always is.
+        for i in 1..=ITERATIONS {
+            let seldom = (0..).map(|pixel| if random(pixel, i) < 0.005 { 101.0 } else { 1.0 });
+            sums.iter_mut().zip(seldom).for_each(|(sum, value)| *sum += value);
+            let picture = |sum: &f64| {
+                [[(sum / f64::from(i)) as f32; 3].as_slice(), &[0.0]]
+                    .concat()
+                    .try_into()
+                    .expect("four")
+            };
+            let pixels: Vec<[f32; 4]> = sums.iter().map(picture).collect();
+            estimate.add(i, Resolved::from_film([SIDE as u32; 2], &pixels));
+        }
+        let squares: f64 = sums.iter().map(|sum| (sum / f64::from(ITERATIONS) - 1.5).powi(2)).sum();
+        let truth = (squares / (SIDE * SIDE) as f64 / (1.01 * 1.5 * 1.5)).sqrt();
+        let found = estimate.relative(ITERATIONS).expect("an estimate").total;
+        assert!((found / truth - 1.0).abs() < 0.25, "{found}, the truth is {truth}");
+    }
+
+    #[test]
+    fn what_lies_beside_the_centres_of_pixels_is_estimated_from_their_neighbours() {
+        const SIDE: usize = 100;
+        const ROWS: usize = 64;
+        // A strip of another brightness whose edges lean by so many pixels a row.
+        for (lean, brightness) in [(0.01, 2.0), (0.2, 2.0), (0.5, 2.0), (0.9, 2.0), (0.2, 20.0), (0.9, 0.1)] {
+            let at = |x: f64, y: f64| {
+                let inside = (30.3..60.8).contains(&(x - lean * (y - 50.0)));
+                if inside { brightness } else { 1.0 }
+            };
+            let centre = |pixel: usize| at((pixel % SIDE) as f64 + 0.5, (pixel / SIDE) as f64 + 0.5);
+            let whole = |pixel: usize| {
+                let place = |index: usize| (index as f64 + 0.5) / ROWS as f64;
+                let (x, y) = ((pixel % SIDE) as f64, (pixel / SIDE) as f64);
+                let sum: f64 = (0..ROWS * ROWS)
+                    .map(|index| at(x + place(index % ROWS), y + place(index / ROWS)))
+                    .sum();
+                sum / (ROWS * ROWS) as f64
+            };
+            let pixels: Vec<[f32; 4]> = (0..SIDE * SIDE)
+                .map(|pixel| {
+                    let value = centre(pixel) as f32;
+                    [value, value, value, 0.0]
+                })
+                .collect();
+            let mean = (0..SIDE * SIDE).map(whole).sum::<f64>() / (SIDE * SIDE) as f64;
+            let relative2 = |pixel| {
+                let truth = whole(pixel);
+                (centre(pixel) - truth).powi(2) / (truth * truth + REL_MSE_FLOOR * mean * mean)
+            };
+            let truth = ((0..SIDE * SIDE).map(relative2).sum::<f64>() / (SIDE * SIDE) as f64).sqrt();
+            let estimated = |estimator| {
+                let config = RenderConfig {
+                    estimator,
+                    ..RenderConfig::default()
+                };
+                let mut estimate = ErrorEstimate::new(&config, 0.0);
+                (1..=4).for_each(|i| estimate.add(i, Resolved::from_film([SIDE as u32; 2], &pixels)));
+                estimate.relative(4).expect("an estimate").total
+            };
+            assert_eq!(estimated(Estimator::Sppm), 0.0);
+            let found = estimated(Estimator::Ppm);
+            println!("{lean} {brightness}: {found} {truth}");
+            assert!(
+                found < 1.5 * truth && truth < 1.5 * found,
+                "edges that lean by {lean}: {found}, the truth is {truth}"
             );
         }
     }
@@ -310,7 +403,7 @@ mod tests {
     #[test]
     fn a_black_picture_has_no_estimate_and_pixels_without_photons_may_lack_one() {
         let taken = |pixels: &[[f32; 4]]| {
-            let mut estimate = ErrorEstimate::new(0.5, 6.0);
+            let mut estimate = ErrorEstimate::new(&with_alpha(0.5), 6.0);
             (1..=8).for_each(|i| estimate.add(i, Resolved::from_film([2, 1], pixels)));
             estimate.relative(8)
         };
@@ -328,7 +421,7 @@ mod tests {
 
     #[test]
     fn the_first_iterations_give_no_estimate_and_memory_stays_bounded() {
-        let mut estimate = ErrorEstimate::new(0.5, 0.0);
+        let mut estimate = ErrorEstimate::new(&with_alpha(0.5), 0.0);
         for i in 1..=1000 {
             assert_eq!(
                 estimate.relative(i).is_some(),

@@ -116,7 +116,7 @@ fn follow(
     known: &mut Convergence,
     measured: &mut dyn FnMut(&Convergence) -> Result<()>,
 ) -> Result<()> {
-    let mut estimate = ErrorEstimate::new(config.alpha, of_one_photon(what.scene, renderer, config));
+    let mut estimate = ErrorEstimate::new(config, of_one_photon(what.scene, renderer, config));
     let (mut wall_s, mut device_s) = (0.0, 0.0);
     let mut next = 1;
     loop {

@@ -79,7 +79,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let progress = Progress::new(limits, arguments.quiet);
     let mut profile = Profile::default();
     let profiled = arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some();
-    let mut estimate = ErrorEstimate::new(config.alpha, of_one_photon(&packed, backend.as_ref(), &config));
+    let mut estimate = ErrorEstimate::new(&config, of_one_photon(&packed, backend.as_ref(), &config));
     let mut error = None;
     while limits.done(backend.iterations(), start.elapsed(), error) < 1.0
         && !(interrupt::asked() && backend.iterations() > 0)
@@ -131,12 +131,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         backend.emitted(),
         with_prefix(backend.emitted() as f64 / seconds),
         backend.device().name,
-        estimated.map_or(String::new(), |error| format!(
-            "; relative error about {:.2} % (noise {:.2} %, bias {:.2} %)",
-            100.0 * error.total,
-            100.0 * error.noise,
-            100.0 * error.bias
-        )),
+        estimated.map_or(String::new(), |error| format!("; {error}")),
     );
     if resolved.without_photons() > 0 {
         say!(

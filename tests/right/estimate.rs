@@ -1,7 +1,7 @@
 //! What renders say of their own error, against references.
 
 use ppm_vk::backend::Backend;
-use ppm_vk::config::RenderConfig;
+use ppm_vk::config::{Estimator, RenderConfig};
 use ppm_vk::estimate::{ErrorEstimate, of_one_photon};
 use ppm_vk::film::Image;
 use ppm_vk::metrics::{compare, relative_errors};
@@ -27,13 +27,27 @@ fn reduced(image: &Image, side: usize) -> Image {
 #[test]
 fn the_true_error_lies_within_a_factor_of_one_and_a_half_of_its_estimate() {
     const SIDE: u32 = 64;
-    for name in ["cornell", "cornell-spheres", "ring", "pool"] {
+    let of_defaults = [
+        "cornell",
+        "cornell-spheres",
+        "ring",
+        "pool",
+        "glossy",
+        "textures",
+        "plaza",
+    ];
+    let of_centres = ["cornell-spheres", "textures"];
+    let cases = of_defaults.map(|name| (name, Estimator::Sppm)).into_iter();
+    for (name, estimator) in cases.chain(of_centres.map(|name| (name, Estimator::Ppm))) {
         let subject = Subject::named(name);
         let reference = reduced(&reference(name), SIDE as usize);
-        let config: RenderConfig = small(SIDE, 25_000);
+        let config = RenderConfig {
+            estimator,
+            ..small(SIDE, 25_000)
+        };
         let mut renderer = subject.renderer(config.clone());
         let photon = of_one_photon(&subject.packed, &renderer, &config);
-        let mut estimate = ErrorEstimate::new(config.alpha, photon);
+        let mut estimate = ErrorEstimate::new(&config, photon);
         for iterations in 1..=64 {
             renderer.iterate().expect("iteration");
             if estimate.wants(iterations) {
@@ -46,14 +60,14 @@ fn the_true_error_lies_within_a_factor_of_one_and_a_half_of_its_estimate() {
             let truth = compare(&picture, &reference).expect("one size").rel_mse.sqrt();
             let estimated = estimate.relative(iterations).expect("an estimate").total;
             println!(
-                "{name}, {iterations} iterations: {:.2} %, {:.2} % estimated, ratio {:.2}",
+                "{name}, {estimator:?}, {iterations} iterations: {:.2} %, {:.2} % estimated, ratio {:.2}",
                 100.0 * truth,
                 100.0 * estimated,
                 truth / estimated
             );
             assert!(
                 truth < 1.5 * estimated && estimated < 1.5 * truth,
-                "{name}, {iterations} iterations: an error of {truth}, {estimated} estimated"
+                "{name}, {estimator:?}, {iterations} iterations: an error of {truth}, {estimated} estimated"
             );
             // The estimate of pixels says where the errors are: they are larger where it says more.
             let of_pixels = estimate.of_pixels(iterations).expect("an estimate");
@@ -79,7 +93,7 @@ fn the_true_error_lies_within_a_factor_of_one_and_a_half_of_its_estimate() {
             };
             assert!(
                 mean(true) > 1.5 * mean(false),
-                "{name}: mean squared errors {} where more is claimed, {} where less",
+                "{name}, {estimator:?}: mean squared errors {} where more is claimed, {} where less",
                 mean(true),
                 mean(false)
             );
