@@ -11,7 +11,7 @@
 //! two parts, and derivatives from a kernel of their own.)
 //!
 //! The paper's estimator looks through the centres of pixels for ever. What that leaves out is told from how much pixels
-//! differ from their neighbours ([`Parts`]).
+//! differ from their neighbours (`estimate/parts.rs`).
 
 mod parts;
 
