@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use crate::backend::{Backend, Resolved};
 use crate::config::{Estimator, RenderConfig};
 use crate::film::Image;
-use crate::metrics::REL_MSE_FLOOR;
+use crate::metrics::floor_of;
 use crate::scene::PackedScene;
 use parts::{OfPixel, Parts};
 
@@ -122,7 +122,7 @@ impl ErrorEstimate {
     fn parts(&self, iterations: u32) -> Option<Parts> {
         let pictures = self.batches()?;
         let last = &pictures[pictures.len() - 1];
-        let floor = REL_MSE_FLOOR * parts::mean(&last.image).powi(2);
+        let floor = floor_of(&last.image);
         if floor <= 0.0 {
             return None;
         }
@@ -133,7 +133,7 @@ impl ErrorEstimate {
         let channel_of = |picture: &Resolved, pixel: usize, channel: usize| picture.image.pixels()[pixel][channel];
         let around = [0, 1, 2].map(|channel| {
             let values = (0..last.curvature.len()).map(|pixel| f64::from(channel_of(last, pixel, channel)));
-            parts::mean_around(&values.collect::<Vec<_>>(), width, false)
+            parts::sums_around(&values.collect::<Vec<_>>(), width)
         });
         let of_pixel = |pixel: usize| {
             let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
@@ -144,6 +144,15 @@ impl ErrorEstimate {
             } else {
                 0.0
             };
+            // Without the pixel itself.
+            let mean_around = |channel: usize, value: f64| {
+                let (sum, count) = around[channel][pixel];
+                if count > 1 {
+                    (sum - value) / (count - 1) as f64
+                } else {
+                    value
+                }
+            };
             let channels: [Batches; 3] = std::array::from_fn(|channel| {
                 Batches::of(pictures.iter().map(|picture| channel_of(picture, pixel, channel)))
             });
@@ -152,7 +161,8 @@ impl ErrorEstimate {
                 noise2: channels.each_ref().map(|batches| batches.noise2() + photon2),
                 relative_noise2: std::array::from_fn(|channel| {
                     let batches = &channels[channel];
-                    batches.relative_noise2(around[channel][pixel], floor) + photon2 / (batches.mean.powi(2) + floor)
+                    batches.relative_noise2(mean_around(channel, batches.mean), floor)
+                        + photon2 / (batches.mean.powi(2) + floor)
                 }),
                 bias2: (curvature.mean.powi(2) - curvature.noise2()) * BIAS_PER_CURVATURE.powi(2),
             }
@@ -243,6 +253,7 @@ impl Batches {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::REL_MSE_FLOOR;
 
     /// Uniform in [0, 1), the same in every run.
     fn random(index: u32, seed: u32) -> f64 {

@@ -2,8 +2,6 @@
 
 use rayon::prelude::*;
 
-use crate::film::Image;
-
 /// Squared second difference of pixels seen through their centres, along rows and columns together, over the squared error
 /// that this makes of them: an upright edge of height h leaves two differences of h, and a pixel that it cuts, evenly spread,
 /// is off by h²/12 in the mean. A slanted edge has 40, a line thinner than a pixel 6.
@@ -65,8 +63,10 @@ impl Parts {
         // A pixel's own bias is all but lost in noise. What noise made negative is missing: without the scale the picture's
         // error were smaller than that of its pixels.
         let bias2 = self.bias2();
-        let mut around = mean_around(&bias2, self.width, true);
-        around.iter_mut().for_each(|part| *part = part.max(0.0));
+        let around: Vec<f64> = sums_around(&bias2, self.width)
+            .into_iter()
+            .map(|(sum, count)| sum.max(0.0) / count as f64)
+            .collect();
         let bias_scale = scale(self.relative_of(&bias2), self.relative_of(&around)) * self.fallen[1];
         let mut aliasing2 = self.aliasing2().0;
         let whole = aliasing2.as_flattened().iter().sum();
@@ -141,27 +141,17 @@ fn scale(signed: f64, positive: f64) -> f64 {
     }
 }
 
-/// Mean over the pixels that are no more than two columns or rows away, with each one itself or without.
-pub(super) fn mean_around(values: &[f64], width: usize, with_itself: bool) -> Vec<f64> {
+/// Sum over the pixels that are no more than two columns or rows away, each one itself among them, and their number.
+pub(super) fn sums_around(values: &[f64], width: usize) -> Vec<(f64, usize)> {
     const REACH: usize = 2;
     let height = values.len() / width;
     let near = |at: usize, side: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(side);
     let of_row = |pixel: usize| values[pixel / width * width..][near(pixel % width, width)].iter().sum();
     let of_rows: Vec<f64> = (0..values.len()).into_par_iter().map(of_row).collect();
-    let mean = |pixel: usize| {
+    let of_pixel = |pixel: usize| {
         let rows = near(pixel / width, height);
         let count = near(pixel % width, width).len() * rows.len();
-        let sum: f64 = rows.map(|row| of_rows[row * width + pixel % width]).sum();
-        match (with_itself, count) {
-            (false, 2..) => (sum - values[pixel]) / (count - 1) as f64,
-            _ => sum / count as f64,
-        }
+        (rows.map(|row| of_rows[row * width + pixel % width]).sum(), count)
     };
-    (0..values.len()).into_par_iter().map(mean).collect()
-}
-
-/// Mean over a picture's pixels and channels.
-pub(super) fn mean(image: &Image) -> f64 {
-    let samples = image.pixels().as_flattened();
-    samples.iter().map(|&value| f64::from(value)).sum::<f64>() / samples.len() as f64
+    (0..values.len()).into_par_iter().map(of_pixel).collect()
 }

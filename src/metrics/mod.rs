@@ -27,7 +27,7 @@ pub struct Comparison {
 pub use flip::flip;
 
 /// relMSE's denominator, the same for all values, beside the reference's own square.
-fn floor_of(reference: &Image) -> f64 {
+pub(crate) fn floor_of(reference: &Image) -> f64 {
     REL_MSE_FLOOR * (mean(reference).iter().sum::<f64>() / 3.0).powi(2)
 }
 
