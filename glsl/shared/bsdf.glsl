@@ -140,11 +140,15 @@ void weigh(inout Boundary boundary, Facing facing, vec3 incoming, Material mater
     }
 }
 
+bool is_rough_glass(Material material) {
+    return ROUGH_GLASS && material.roughness * material.roughness >= SMOOTH_ALPHA;
+}
+
 // outside: index of refraction. u chooses the microfacet of a rough boundary. A thin wall is crossed without bending.
 Boundary meet_boundary(Facing facing, vec3 incoming, Material material, float outside, vec2 u) {
     vec3 n = facing.shading_normal;
     float alpha = material.roughness * material.roughness;
-    bool rough = ROUGH_GLASS && alpha >= SMOOTH_ALPHA;
+    bool rough = is_rough_glass(material);
     Facing micro = facing;
     if (rough) {
         micro.shading_normal = visible_normal(alpha, n, -incoming, u);

@@ -221,8 +221,7 @@ void main() {
                     if (DISPERSION) {
                         branch.throughput *= disperse(material, branch.wavelength, random);
                     }
-                    bool rough = ROUGH_GLASS && material.roughness * material.roughness >= SMOOTH_ALPHA;
-                    if (PUNCTUAL_LIGHTS && rough) {
+                    if (PUNCTUAL_LIGHTS && is_rough_glass(material)) {
                         branch.emitted +=
                             branch.throughput * glint(met, material, facing, reflector, viewer, random);
                     }

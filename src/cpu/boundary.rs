@@ -27,7 +27,7 @@ impl Boundary {
     /// of a rough boundary.
     pub fn new(facing: &Facing, incoming: DVec3, material: &Material, outside: f64, u: [f64; 2]) -> Self {
         let n = facing.shading_normal;
-        let microfacets = Reflector::matte(DVec3::ZERO).with_alpha(f64::from(material.roughness).powi(2));
+        let microfacets = Reflector::microfacets_of(material);
         let rough = !microfacets.is_smooth();
         let m = if rough {
             microfacets.visible_normal(n, -incoming, u)

@@ -298,9 +298,8 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 facing.reflect(incoming)
             } else {
                 branch.throughput *= disperse(&mut material, &mut branch.wavelength, &mut random);
-                let microfacets = reflector.with_alpha(f64::from(material.roughness).powi(2));
-                if inputs.scene.features.punctual && !microfacets.is_smooth() {
-                    let seen = glint(inputs, &met, &material, &facing, &microfacets, incoming, &random);
+                if inputs.scene.features.punctual && !Reflector::microfacets_of(&material).is_smooth() {
+                    let seen = glint(inputs, &met, &material, &facing, &reflector, incoming, &random);
                     branch.emitted += branch.throughput * seen;
                 }
                 let boundary = Boundary::new(&facing, incoming, &material, met.outside, [second, third]);

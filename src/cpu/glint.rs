@@ -16,7 +16,7 @@ use crate::layout::{DIRECTIONAL_LIGHT, Light, Material};
 /// Of 65,536 numbers of faces that a ray passes, the last.
 const FIRST_OF_GLINT: u32 = 65_520;
 
-/// By a ray to one of the lights or, where visible points are found once, to each.
+/// By a ray to one of the lights or, where visible points are found once, to each. `reflector`: of what isn't glass.
 pub(super) fn glint(
     inputs: &Inputs<'_>,
     met: &Encounter,
@@ -48,7 +48,7 @@ pub(super) fn glint(
             let medium = if same_side { met.through } else { met.beyond };
             let is_far = light.kind == DIRECTIONAL_LIGHT;
             let way = if is_far { FAR } else { ray.length() };
-            glass_response(facing, reflector, incoming, direction, material, met.outside)
+            glass_response(facing, incoming, direction, material, met.outside)
                 * if same_side { DVec3::ONE } else { met.tint }
                 * transmittance(inputs, medium, way)
         } else if same_side && cosine > 0.0 {
@@ -69,15 +69,9 @@ pub(super) fn glint(
 
 /// BSDF · cos of a rough boundary of glass without its tint, as [`Boundary::new`] draws it: Walter and others, «Microfacet Models for Refraction
 /// through Rough Surfaces», EGSR 2007. `l`: to the light.
-fn glass_response(
-    facing: &Facing,
-    microfacets: &Reflector,
-    incoming: DVec3,
-    l: DVec3,
-    material: &Material,
-    outside: f64,
-) -> DVec3 {
+fn glass_response(facing: &Facing, incoming: DVec3, l: DVec3, material: &Material, outside: f64) -> DVec3 {
     let (n, v) = (facing.shading_normal, -incoming);
+    let microfacets = Reflector::microfacets_of(material);
     let ior = f64::from(material.ior) / outside;
     let thin = material.thin != 0;
     let eta = if facing.front || thin { 1.0 / ior } else { ior };
@@ -145,14 +139,13 @@ mod tests {
     /// What is reflected and what passes, by integration over all directions.
     fn integrated(facing: &Facing, incoming: DVec3, material: &Material) -> [f64; 2] {
         const STEPS: u32 = 800;
-        let microfacets = Reflector::matte(DVec3::ZERO).with_alpha(f64::from(material.roughness).powi(2));
         let at = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS);
         let mut sums = [0.0; 2];
         for i in 0..STEPS * STEPS {
             let (across, z) = (PI * at(i / STEPS)).sin_cos();
             let (sin, cos) = (2.0 * PI * at(i % STEPS)).sin_cos();
             let l = DVec3::new(across * cos, across * sin, z);
-            sums[usize::from(z < 0.0)] += across * glass_response(facing, &microfacets, incoming, l, material, 1.0).x;
+            sums[usize::from(z < 0.0)] += across * glass_response(facing, incoming, l, material, 1.0).x;
         }
         sums.map(|sum| sum * 2.0 * PI * PI / f64::from(STEPS * STEPS))
     }

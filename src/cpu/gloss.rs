@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-
 use half::f16;
 
 use super::sampling::{basis, decode_direction, encode_direction};
@@ -73,9 +72,12 @@ impl Reflector {
         }
     }
 
-    /// The same with microfacets.
-    pub(super) fn with_alpha(self, alpha: f64) -> Self {
-        Self { alpha, ..self }
+    /// The microfacets of glass; what it reflects isn't among this.
+    pub(super) fn microfacets_of(glass: &Material) -> Self {
+        Self {
+            alpha: f64::from(glass.roughness).powi(2),
+            ..Self::matte(DVec3::ZERO)
+        }
     }
 
     /// What a visible point keeps, and the direction to the viewer.

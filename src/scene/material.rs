@@ -128,7 +128,7 @@ impl Reader<'_> {
             return Ok(Surface::Matte);
         }
         // KHR_materials_ior and KHR_materials_specular.
-        let of_ior = ((ior - 1.0) / (ior + 1.0)).powi(2);
+        let of_ior = normal_reflectance(ior);
         let gloss = Gloss {
             metallic,
             roughness,
@@ -308,6 +308,11 @@ impl Reader<'_> {
     fn warn(&mut self, warning: String) {
         self.warnings.push(warning);
     }
+}
+
+/// A dielectric's reflectance at normal incidence.
+pub(super) fn normal_reflectance(ior: f32) -> f32 {
+    ((ior - 1.0) / (ior + 1.0)).powi(2)
 }
 
 /// A texture of normals whose scale is one.

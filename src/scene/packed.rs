@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::{DVec3, Vec3, Vec4};
 
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
+use super::material::normal_reflectance;
 use super::object_grid::object_grids;
 use super::{
     Alpha, Dielectric, Environment, Gloss, MaterialTextures, SHARED, Scene, Surface, area, bvh, contact, environment,
@@ -314,7 +315,7 @@ fn material(material: &super::Material) -> Material {
 /// Whether a dielectric reflects another part of the light than its index says: KHR_materials_specular.
 fn is_changed(glass: &Material) -> bool {
     let textures = [glass.specular_texture, glass.specular_color_texture];
-    let of_ior = ((glass.ior - 1.0) / (glass.ior + 1.0)).powi(2);
+    let of_ior = normal_reflectance(glass.ior);
     let is_other = |f0: &f32| (f0 - of_ior).abs() > 1e-6 * of_ior;
     textures != [NO_TEXTURE; 2] || glass.specular_f90 != 1.0 || glass.specular_f0.iter().any(is_other)
 }
