@@ -1,6 +1,7 @@
 //! A small writer of glTF 2.0: one JSON document and one binary buffer.
 
 use super::mesh::Mesh;
+use glam::{DMat3, DQuat, DVec3};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
@@ -170,6 +171,12 @@ impl Document {
 
     /// Adds a mesh and a node that shows it.
     pub fn object(&mut self, name: &str, mesh: &Mesh, material: usize) -> Node<'_> {
+        let mesh = self.mesh(name, mesh, material);
+        self.again(name, mesh)
+    }
+
+    /// Adds a mesh and returns its index.
+    pub fn mesh(&mut self, name: &str, mesh: &Mesh, material: usize) -> usize {
         let positions: Vec<_> = mesh.positions.iter().map(|p| p.as_vec3().to_array()).collect();
         let normals: Vec<_> = mesh.normals.iter().map(|n| n.as_vec3().to_array()).collect();
         let texcoords: Vec<_> = mesh.texcoords.iter().map(|t| t.as_vec2().to_array()).collect();
@@ -186,16 +193,10 @@ impl Document {
             "indices": self.indices(mesh.triangles.as_flattened()),
             "material": material,
         });
-        let mesh = push(&mut self.meshes, json!({ "name": name, "primitives": [primitive] }));
-        self.node(json!({ "name": name, "mesh": mesh }))
+        push(&mut self.meshes, json!({ "name": name, "primitives": [primitive] }))
     }
 
-    /// The mesh that was added last.
-    pub fn last_mesh(&self) -> usize {
-        self.meshes.len() - 1
-    }
-
-    /// Adds another node that shows a mesh.
+    /// Adds a node that shows a mesh; any number may.
     pub fn again(&mut self, name: &str, mesh: usize) -> Node<'_> {
         self.node(json!({ "name": name, "mesh": mesh }))
     }
@@ -208,14 +209,14 @@ impl Document {
 
     /// Adds a camera in the plane x = 0 at `eye` that looks at `target` (each y, z), with an aspect ratio of 1.
     pub fn camera(&mut self, eye: [f64; 2], target: [f64; 2], field_of_view_degrees: f64) {
-        let perspective = json!({
-            "yfov": field_of_view_degrees.to_radians(),
-            "aspectRatio": 1.0,
-            "znear": 0.01,
-            "zfar": 1000.0,
-        });
-        let camera = json!({ "name": "camera", "type": "perspective", "perspective": perspective });
-        self.place_camera(camera, eye, target);
+        self.place_camera(perspective(field_of_view_degrees), eye, target);
+    }
+
+    /// The same at any place.
+    pub fn camera_from(&mut self, eye: DVec3, target: DVec3, field_of_view_degrees: f64) {
+        let camera = push(&mut self.cameras, perspective(field_of_view_degrees));
+        let mut node = self.node(json!({ "name": "camera", "camera": camera }));
+        node.at(eye.to_array()).towards(target - eye);
     }
 
     /// The same without perspective, which shows so much of either side of `target`.
@@ -366,11 +367,31 @@ impl Node<'_> {
         self
     }
 
+    /// Turns its −z along `direction`, before the translation, with x level.
+    pub fn towards(&mut self, direction: DVec3) -> &mut Self {
+        let back = -direction.normalize();
+        let right = DVec3::Y.cross(back).normalize();
+        let turn = DQuat::from_mat3(&DMat3::from_cols(right, back.cross(right), back));
+        self.0["rotation"] = json!(turn.to_array());
+        self
+    }
+
     /// Scales it along its axes, before the rotation.
     pub fn scaled(&mut self, factors: [f64; 3]) -> &mut Self {
         self.0["scale"] = json!(factors);
         self
     }
+}
+
+/// A camera with an aspect ratio of 1.
+fn perspective(field_of_view_degrees: f64) -> Value {
+    let lens = json!({
+        "yfov": field_of_view_degrees.to_radians(),
+        "aspectRatio": 1.0,
+        "znear": 0.01,
+        "zfar": 1000.0,
+    });
+    json!({ "name": "camera", "type": "perspective", "perspective": lens })
 }
 
 /// Appends `value` and returns its index.

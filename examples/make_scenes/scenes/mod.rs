@@ -1,6 +1,7 @@
 //! The project's own scenes. Units are metres, y is up; radiance is linear RGB.
 
 mod document;
+mod hard;
 mod known;
 mod mesh;
 mod spheres;
@@ -36,6 +37,13 @@ pub fn all() -> Vec<File> {
         lights(),
         plaza(),
         known::slab(),
+        hard::table(),
+        hard::stadium(),
+        hard::sun_room(),
+        hard::sun_room_open(),
+        hard::blinds(),
+        hard::far_lamp(),
+        hard::many_lamps(),
     ]
     .into_iter()
     .flat_map(Document::finish)
@@ -154,8 +162,8 @@ fn instances() -> Document {
     let mut ball = Mesh::icosphere(0.25, 2);
     let place = |p: &DVec3| dvec2(2.0 * p.x.atan2(p.z), 4.0 * p.y) * 2.0;
     ball.texcoords = ball.positions.iter().map(place).collect();
-    scene.object("ball", &ball, studded).at([-0.6, 1.0, -0.5]);
-    let ball = scene.last_mesh();
+    let ball = scene.mesh("ball", &ball, studded);
+    scene.again("ball", ball).at([-0.6, 1.0, -0.5]);
     let mut mirrored = scene.again("mirrored", ball);
     mirrored
         .at([0.0, 1.1, -0.6])
@@ -169,8 +177,8 @@ fn instances() -> Document {
     pair.at([0.0, 0.4, -0.2]).rotated(UP, 0.3).scaled([1.2, 0.6, 0.8]);
 
     let white = scene.material(matte("hoop", WHITE));
-    scene.object("hoop", &Mesh::ring(0.2, 0.24, -0.04, 0.04, 24), white);
-    let hoop = scene.last_mesh();
+    let hoop = scene.mesh("hoop", &Mesh::ring(0.2, 0.24, -0.04, 0.04, 24), white);
+    scene.again("hoop", hoop);
     scene
         .again("smaller", hoop)
         .rotated([0.0, 0.0, 1.0], 1.2)
@@ -179,10 +187,8 @@ fn instances() -> Document {
     hoops.at([0.1, 0.3, 0.5]).rotated([1.0, 0.0, 0.0], 0.9);
 
     let glass = scene.material(clear("glass", 1.5));
-    scene
-        .object("glass", &Mesh::ring(0.12, 0.25, 0.0, 0.16, 20), glass)
-        .at([-0.55, 0.0, 0.5]);
-    let glass = scene.last_mesh();
+    let glass = scene.mesh("glass", &Mesh::ring(0.12, 0.25, 0.0, 0.16, 20), glass);
+    scene.again("glass", glass).at([-0.55, 0.0, 0.5]);
     let mut other = scene.again("other glass", glass);
     other.at([0.6, 0.0, 0.5]).rotated(UP, 0.5).scaled([1.0, 1.5, 0.7]);
     scene.camera([1.0, 3.9], [1.0, 0.0], 39.3);
