@@ -161,7 +161,8 @@ float enter_box(vec3 box_min, vec3 box_max, LocalRay ray, float limit) {
     return enter <= leave ? enter : 1e30;
 }
 
-const uint STACK_SIZE = 64u;
+// No hierarchy is deeper than 64. One entry more, since compilers that turn arrays of up to 256 bytes into registers spill here.
+const uint STACK_SIZE = 65u;
 const uint LEAF = 0x80000000u; // of a reference to a leaf's first record, see layout::BvhRecord
 const uint PLACEMENT_RECORD = 1u; // kinds of a leaf's records, triangles' but not
 const uint RAY_RECORD = 2u;
