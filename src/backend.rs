@@ -3,7 +3,9 @@
 use crate::config::RenderConfig;
 use crate::error::Result;
 use crate::film::Image;
-use crate::layout::Settings;
+use crate::layout::{BehindGlass, Settings};
+use crate::metrics;
+use crate::radius::{MOST_FOOTPRINTS, PILOT_FOOTPRINTS};
 use crate::record::Run;
 use crate::scene::{Camera, Lens, PackedScene, Projection};
 
@@ -32,36 +34,36 @@ pub trait Backend {
     fn emitted(&self) -> u64;
     /// What happened besides the picture.
     fn counters(&self) -> Counters;
-    /// The initial radius, render units.
+    /// The median of the initial radii of global photons, render units.
     fn radius(&self) -> f32;
+    /// Mean flux of the photons that visible points wanted before the first iteration, not divided by the emitted paths; `None`
+    /// where there were none.
+    fn photon_flux(&self) -> Option<f64>;
+    /// Whether photon paths are aimed.
+    fn aims(&self) -> bool;
     /// What it runs on.
     fn device(&self) -> DeviceDescription;
 }
 
-/// A picture, and what tells its bias.
+/// A picture, and what tells its error.
 #[derive(Debug, Clone)]
 pub struct Resolved {
     /// The picture.
     pub image: Image,
     /// Of each pixel, its photons' flux weighed with 1 − 2 distance²/R², as radiance: see [`crate::estimate`]. Infinite where
-    /// no photon has come yet.
+    /// no photon has come yet to a surface that isn't in the open.
     pub curvature: Vec<f32>,
+    /// Of each pixel, what tells whether it has its part of the light behind glass.
+    pub behind_glass: Vec<BehindGlass>,
 }
 
 impl Resolved {
-    /// Pixels that see a surface to which no photon has come yet.
-    pub fn without_photons(&self) -> usize {
-        self.curvature
-            .iter()
-            .filter(|curvature| curvature.is_infinite())
-            .count()
-    }
-
-    /// From a renderer's film: RGB and curvature, in rows from the top left.
-    pub fn from_film(resolution: [u32; 2], film: &[[f32; 4]]) -> Self {
+    /// From a renderer's films: RGB and curvature, and what tells of light behind glass, in rows from the top left.
+    pub fn from_film(resolution: [u32; 2], film: &[[f32; 4]], behind_glass: Vec<BehindGlass>) -> Self {
         Self {
             image: Image::from_film(resolution, film),
             curvature: film.iter().map(|pixel| pixel[3]).collect(),
+            behind_glass,
         }
     }
 }
@@ -80,8 +82,12 @@ pub struct DeviceDescription {
 /// What happened in a render besides its picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
-    /// Photons stored in all iterations.
+    /// Photons that landed where visible points could be, in all iterations.
+    pub photons_landed: u64,
+    /// Those of them that a visible point might accept, and that were stored.
     pub photons_stored: u64,
+    /// Photons that visible points had accepted when the picture was last made, as often as one did.
+    pub photons_accepted: u64,
     /// Paths that the bounce limit ended.
     pub truncated_paths: u64,
     /// Paths that the driver's loop limit ended.
@@ -97,6 +103,17 @@ pub struct Counters {
 }
 
 impl Counters {
+    /// What became of the photons, in words.
+    pub fn photons(&self) -> String {
+        let Self {
+            photons_landed,
+            photons_stored,
+            photons_accepted,
+            ..
+        } = self;
+        format!("{photons_landed} photons landed, {photons_stored} kept, {photons_accepted} times accepted")
+    }
+
     /// What of it a user has to know, one line each.
     pub fn warnings(&self, emitted: u64, max_depth: u32) -> Vec<String> {
         let mut warnings = Vec::new();
@@ -129,12 +146,18 @@ impl Counters {
     }
 }
 
+/// What relMSE has beside the squared radiance, of the picture so far; 1 of a black one. Photons are wanted by this measure.
+pub fn demand_floor2(resolved: &Resolved) -> f32 {
+    let mean = metrics::mean(&resolved.image).iter().sum::<f64>() / 3.0;
+    let floor2 = metrics::REL_MSE_FLOOR * mean * mean;
+    if floor2 > 0.0 { floor2 as f32 } else { 1.0 }
+}
+
 /// Radii, in render units, between which R² and the flux over it stay far from f32's limits.
 const SMALLEST_RADIUS: f64 = 1e-12;
 const LARGEST_RADIUS: f64 = 1e6;
 
-/// What the stages read of the configuration, the scene and the camera; the buffers' sizes are left at 0. The initial R²
-/// is 0 where it has to be found.
+/// What the stages read of the configuration, the scene and the camera; the buffers' sizes are left at 0.
 pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loop_limit: u32) -> Settings {
     let [width, height] = config.resolution;
     let (half_height, orthographic) = match camera.projection {
@@ -169,5 +192,15 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         }),
         loop_limit,
         bsdf_sampling: scene.bsdf_sampling,
+        first_footprints: [PILOT_FOOTPRINTS; 2],
+        most_footprints: if config.radius.is_some() {
+            [0.0; 2]
+        } else {
+            MOST_FOOTPRINTS
+        },
+        photon_maps: 1,
+        pixel_spread: 2.0 * half_height / height as f32,
+        demand_floor2: 1.0,
+        padding: 0,
     }
 }

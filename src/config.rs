@@ -1,11 +1,13 @@
 //! What the user asked for, and every buffer size and group count that follows from it.
 
 mod sizes;
+mod tiles;
 
 pub use sizes::{
-    CLUSTERED_RUN, CURVE_BITS, EXHAUSTIVE_RANGE, GROUP, LLOYD_ROUNDS, Limits, NO_SLOT, PPM_SLOTS, Probe, RADIUS_GROUPS,
-    RADIUS_STEP, SCAN_BLOCK, SORT_DIGIT_BITS, SORT_TILE, Sizes, TILE,
+    CLUSTERED_RUN, CURVE_BITS, DEMAND_BITS, EXHAUSTIVE_RANGE, GROUP, LLOYD_ROUNDS, Limits, MOST_EMISSION_CELLS,
+    MOST_TARGETS, NO_SLOT, PPM_SLOTS, Probe, SCAN_BLOCK, SORT_DIGIT_BITS, SORT_TILE, Sizes, TILE,
 };
+pub use tiles::pixel_of;
 
 use crate::error::{Error, Result};
 
@@ -43,6 +45,25 @@ pub enum TriangleTest {
     Watertight,
     /// From precomputed planes, as in the paper (Havel and Herout): some rays pass between neighbours.
     Havel,
+}
+
+/// How photon paths start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum EmissionChoice {
+    /// Where paths were found to bring photons that the picture needs.
+    Aimed,
+    /// In proportion to the lights' power, as in the paper.
+    Power,
+}
+
+impl EmissionChoice {
+    /// What an estimator uses where the user doesn't say.
+    pub fn of(estimator: Estimator) -> Self {
+        match estimator {
+            Estimator::Sppm => Self::Aimed,
+            Estimator::Ppm => Self::Power,
+        }
+    }
 }
 
 /// Where the numbers of paths come from.
@@ -92,6 +113,12 @@ pub struct RenderConfig {
     pub triangle_test: TriangleTest,
     /// Bounces of a path at the most.
     pub max_depth: u32,
+    /// Whether photons that no visible point can accept are dropped where they land, by the estimator `sppm`.
+    pub drop_unwanted: bool,
+    /// How photon paths start.
+    pub emission: EmissionChoice,
+    /// Whether paths are aimed even where pilots say that it isn't worth its cost.
+    pub aims_anyway: bool,
     /// Where the numbers of paths come from.
     pub sampler: Sampler,
     /// Seed of all random numbers.
@@ -112,6 +139,9 @@ impl Default for RenderConfig {
             accel: Accel::Bvh,
             triangle_test: TriangleTest::Watertight,
             max_depth: 64,
+            drop_unwanted: true,
+            emission: EmissionChoice::Aimed,
+            aims_anyway: false,
             sampler: Sampler::Sobol,
             seed: 0,
         }
@@ -160,6 +190,11 @@ impl RenderConfig {
         Ok(())
     }
 
+    /// Whether photons that no visible point can accept are dropped where they land. The paper keeps all.
+    pub fn drops_unwanted(&self) -> bool {
+        self.drop_unwanted && self.estimator == Estimator::Sppm
+    }
+
     /// First of the iterations whose numbers are one sequence of low discrepancy with those of `iteration`. Blocks grow
     /// with the render, to a fourth of it and less, and are independent of each other: their spread is what the error is
     /// estimated from ([`crate::estimate`], whose batches are whole blocks).
@@ -174,6 +209,12 @@ impl RenderConfig {
     /// is worse than nothing.
     pub fn coverage_points(&self, iteration: u32) -> u32 {
         16 >> iteration.saturating_add(1).ilog2().min(4)
+    }
+
+    /// Whether shadow rays that end on glass go on in an iteration to say what light lies behind it: in the first ones, and
+    /// then now and then, since it takes more rays. Of the first ones, points that have photons take a part in the very first.
+    pub fn asks_behind_glass(&self, iteration: u32) -> bool {
+        iteration < 8 || iteration.is_multiple_of(32)
     }
 
     /// Photon paths of the block before `iteration`.

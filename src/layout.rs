@@ -5,6 +5,12 @@ use bytemuck::{Pod, Zeroable};
 /// Object of a visible point whose path met no matte surface.
 pub const NO_OBJECT: u32 = u32::MAX;
 
+/// Bit of a photon's object: since the light it has met mirrors and glass alone, in a scene that gathers such photons apart.
+pub const CAUSTIC: u32 = 1 << 31;
+
+/// Shells around the camera that have grids of their own.
+pub const SHELLS: usize = 8;
+
 /// Light of a triangle that doesn't emit.
 pub const NO_LIGHT: u32 = u32::MAX;
 
@@ -43,6 +49,9 @@ pub const BACK_EMITS: u32 = 1;
 pub const BACK_HIDDEN: u32 = 2;
 /// [`Material::flags`]: a dielectric that reflects another part of the light than its index says.
 pub const SPECULAR_CHANGED: u32 = 4;
+
+/// Below this α of GGX camera paths follow reflections.
+pub const FOLLOWED_ALPHA: f64 = 0.1;
 
 /// Texture of a material that has none there.
 pub const NO_TEXTURE: u32 = u32::MAX;
@@ -106,7 +115,7 @@ macro_rules! device_structs {
 
 device_structs! {
     /// What stays the same through a render. Lengths in render units.
-    pub struct Settings: 128 {
+    pub struct Settings: 160 {
         /// xyz: centre of projection; w: radius of the lens.
         pub camera_position: [f32; 4],
         /// xyz: to the picture's right edge, at distance 1; w: distance along the direction of view of what is in focus.
@@ -139,12 +148,24 @@ device_structs! {
         pub cell_bits: u32,
         /// Eq. 2's α.
         pub alpha: f32,
-        /// R² before the first photon.
+        /// The user's R² before the first photon; 0 where it follows the footprints.
         pub initial_radius2: f32,
         /// Iterations that all loops of one invocation may make together.
         pub loop_limit: u32,
         /// Probability that direct light is sampled by a direction of the BSDF instead of a light's point.
         pub bsdf_sampling: f32,
+        /// R before the first photon in footprints, of global and of caustic photons.
+        pub first_footprints: [f32; 2],
+        /// R at the most; 0: no bound.
+        pub most_footprints: [f32; 2],
+        /// 2 where caustic photons are gathered apart from the others, else 1.
+        pub photon_maps: u32,
+        /// Side of a pixel's footprint at distance 1 along a path, or anywhere where rays are parallel.
+        pub pixel_spread: f32,
+        /// What the squared radiance has beside it where what visible points want of photons is weighed.
+        pub demand_floor2: f32,
+        /// Zero.
+        pub padding: u32,
     }
 
     /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf, or one of the two of an
@@ -322,8 +343,10 @@ device_structs! {
         pub accept: f32,
         /// Of the cell: the light that the rest of it chooses.
         pub alias: u32,
+        /// Probability of this light and those before it among the lights of its source ([`EmissionCell`]), a multiple of 2⁻²⁴.
+        pub cumulative: f32,
         /// Zero.
-        pub padding: [u32; 2],
+        pub padding: u32,
         /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB.
         pub intensity: [f32; 3],
         /// Spot: 1 − cos of the angle where it begins to fall off.
@@ -336,6 +359,31 @@ device_structs! {
         pub direction: [f32; 3],
         /// Point, spot: 1 over the distance that it reaches, 0 where it reaches any.
         pub inverse_range: f32,
+    }
+
+    /// A box of starts of photon paths, and a cell of the alias table that chooses one. A start has five coordinates in [0, 1):
+    /// place x and y, direction x and y, and which light of its source.
+    pub struct EmissionCell: 64 {
+        /// Lower corner of the box, but for the last coordinate.
+        pub low: [f32; 4],
+        /// Its sides.
+        pub size: [f32; 4],
+        /// Lower end of the last coordinate.
+        pub low_light: f32,
+        /// That side.
+        pub size_light: f32,
+        /// The box's volume over its probability.
+        pub weight: f32,
+        /// Of the table's cell: the part of it that chooses this box.
+        pub accept: f32,
+        /// Of the table's cell: the box that the rest of it chooses.
+        pub alias: u32,
+        /// First light of the source.
+        pub first_light: u32,
+        /// How many it has.
+        pub lights: u32,
+        /// Index of the sphere that the paths meet first of all, or the number of spheres for those that meet none.
+        pub target: u32,
     }
 
     /// The paper's hitpoint.
@@ -360,7 +408,7 @@ device_structs! {
 
     /// A photon.
     pub struct Photon: 32 {
-        /// xyz: position; w: u32 bits, object.
+        /// xyz: position; w: u32 bits, object and [`CAUSTIC`].
         pub position_object: [f32; 4],
         /// rgb: flux, not divided by the emitted paths; w: u32 bits, octahedral direction of flight.
         pub flux_direction: [f32; 4],
@@ -398,36 +446,54 @@ device_structs! {
 
     /// Radiance seen directly, summed over the iterations.
     pub struct DirectSum: 32 {
-        /// rgb: leading f32s.
+        /// rgb: leading f32s; w: what lights behind glass would have added unbent.
         pub high: [f32; 4],
-        /// rgb: rest.
+        /// rgb: rest; w: iterations that asked for that.
         pub low: [f32; 4],
     }
 
     /// Of the discs around a visible point, how much can have photons, in sixteenths.
-    pub struct Coverage: 8 {
+    pub struct Coverage: 16 {
         /// That can.
         pub covered: u32,
         /// In all.
         pub asked: u32,
-    }
-
-    /// Sums over visible points' radii.
-    pub struct RadiusSum: 16 {
-        /// Σ R².
-        pub radius2: f32,
-        /// Σ 1/R².
-        pub inverse2: f32,
-        /// Visible points.
-        pub count: u32,
+        /// Iterations in which a ray from a point without photons met something that may send it some.
+        pub surrounded: u32,
         /// Zero.
         pub padding: u32,
     }
 
-    /// The hashed grid of an iteration.
-    pub struct GridShape: 4 {
-        /// 1 / cell size.
-        pub inverse_cell_size: f32,
+    /// Of a pixel, what tells whether it has its part of the light behind glass.
+    pub struct BehindGlass: 20 {
+        /// Radiance that it would have of that light if the glass didn't bend it, mean of the channels.
+        pub unbent: f32,
+        /// Radiance that such photons gave it, likewise.
+        pub arrived: f32,
+        /// Their number.
+        pub photons: f32,
+        /// R, in pixels.
+        pub radius: f32,
+        /// R², render units.
+        pub radius2: f32,
+    }
+
+    /// Of the radii of discs in a shell around the camera, see `glsl/shared/grid.glsl`.
+    pub struct ShellRadii: 16 {
+        /// Σ log2 R of a sample of them, offset, in parts of 256.
+        pub logs: u32,
+        /// Of that sample.
+        pub count: u32,
+        /// Bits of the largest R² of all.
+        pub largest: u32,
+        /// Zero.
+        pub padding: u32,
+    }
+
+    /// The hashed grids of an iteration.
+    pub struct GridShape: 64 {
+        /// 1 / cell size of each photon map's shells.
+        pub inverse_cell_size: [f32; 2 * SHELLS],
     }
 
     /// A grid of cubes for an object. The scene's.
@@ -443,7 +509,7 @@ device_structs! {
     }
 
     /// What the stages report to the host.
-    pub struct StatusCounters: 40 {
+    pub struct StatusCounters: 56 {
         /// Most photons that one lane had to store.
         pub lane_need: u32,
         /// Most photons of a batch.
@@ -464,5 +530,13 @@ device_structs! {
         pub lost_photons: u32,
         /// Grid cells that had more than that maximum.
         pub full_cells: u32,
+        /// Photons that landed where visible points could be, wanted or not, low word.
+        pub photons_landed_low: u32,
+        /// High word.
+        pub photons_landed_high: u32,
+        /// Photons that the picture's visible points accepted in all iterations, low word.
+        pub photons_accepted_low: u32,
+        /// High word.
+        pub photons_accepted_high: u32,
     }
 }

@@ -13,11 +13,13 @@
 
 #![warn(missing_docs)]
 
+pub mod alias;
 pub mod backend;
 pub mod bench;
 pub mod cli;
 pub mod config;
 pub mod cpu;
+pub mod emission;
 pub mod error;
 pub mod estimate;
 pub mod film;
@@ -27,6 +29,7 @@ pub mod layout;
 pub mod metrics;
 pub mod pipeline;
 pub mod radius;
+pub mod random;
 pub mod record;
 pub mod report;
 pub mod scene;

@@ -1,14 +1,17 @@
-//! The initial radius, where the user gives none.
+//! The first radii, where the user gives none: in footprints of the pixels.
 
 use std::num::NonZero;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
-use crate::layout::{NO_OBJECT, Photon, VisiblePoint};
+use crate::config::pixel_of;
+use crate::layout::{CAUSTIC, NO_OBJECT, Photon, Statistics, VisiblePoint};
 
 /// How many photons a visible point may be wanted to accept in the first iteration. The first is what the others' blur is
 /// measured against.
 const CANDIDATES: [usize; 7] = [8, 12, 16, 24, 32, 48, 64];
+/// So many are enough for a caustic: what it has is edges.
+const MOST_CAUSTIC: usize = 16;
 /// The iteration whose photons the radius is found from; no render gets that far.
 pub const PILOT: u32 = u32::MAX;
 /// Rounds of shrinking the radius where photons are denser than wanted.
@@ -17,52 +20,166 @@ pub const FITS: u32 = 2;
 const MOST_BLUR: f64 = 4.0;
 /// Visible points that are asked.
 const PROBES: usize = 2048;
-/// R² where no visible point sees enough photons, square render units (the scene is 2 long).
-const WITHOUT_PHOTONS: f32 = 4e-4;
+/// Footprints of a pixel that R has at the most, of global and of caustic photons: a larger disc would blur what can be seen.
+/// Caustics have finer detail.
+pub const MOST_FOOTPRINTS: [f32; 2] = [32.0, 8.0];
+/// R of the discs for which pilot photons are wanted, footprints: large enough that all that is seen is covered, small enough that
+/// the room behind a wall isn't.
+pub const PILOT_FOOTPRINTS: f32 = 4.0;
+/// Footprints that R has at least before the first photon: a smaller disc would show nothing more.
+pub const LEAST_FOOTPRINTS: f32 = 0.5;
 
-/// The automatic initial radius.
+/// What the discs of a photon map begin with.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Automatic {
-    /// R², square render units.
-    pub radius2: f32,
+pub struct First {
+    /// R, footprints.
+    pub footprints: f32,
     /// Photons that a visible point should accept in the first iteration, at the most; the median one finds as many
-    /// within R.
+    /// within R unless a bound holds.
     pub photons: usize,
 }
 
-/// Chooses how many photons visible points should accept, so that noise and blur together are least, and R² such that the
+/// The same of each photon map, from pilot photons. `footprints` are those of the visible points, `share` the pilot's part of
+/// an iteration's photon paths.
+pub fn first(visible_points: &[VisiblePoint], footprints: &[f32], photons: &[Photon], share: f32) -> [First; 2] {
+    let in_map = |photon: &&Photon| photon.position_object[3].to_bits() & CAUSTIC != 0;
+    let (caustic, global): (Vec<&Photon>, Vec<&Photon>) = photons.iter().partition(in_map);
+    [(0, global), (1, caustic)].map(|(map, photons)| {
+        let most = MOST_FOOTPRINTS[map];
+        let most_photons = if map == 1 { MOST_CAUSTIC } else { usize::MAX };
+        let Automatic { footprints, photons } = automatic(visible_points, footprints, &photons, most_photons);
+        First {
+            footprints: (footprints * share.sqrt()).clamp(LEAST_FOOTPRINTS, most),
+            photons,
+        }
+    })
+}
+
+/// Pixels by which R may grow from a pixel to its neighbour.
+const SLOPE: f32 = 0.2;
+
+/// Lets no caustic disc be much larger than those of the pixels around: light has edges, and a disc beside one that reached
+/// past it would make it blurred. `statistics`: of all slots, one a pixel.
+pub fn sharpen(resolution: [u32; 2], footprints: &[f32], statistics: &mut [Statistics]) {
+    let [width, height] = resolution.map(|side| side as usize);
+    let mut radii = vec![f32::INFINITY; width * height];
+    let slots = || (0..footprints.len()).filter_map(|slot| Some((slot, pixel_of(resolution, slot as u32)?)));
+    let place = |[x, y]: [u32; 2]| y as usize * width + x as usize;
+    for (slot, pixel) in slots() {
+        let radius2 = statistics[slot].radius2_high;
+        if radius2 > 0.0 {
+            radii[place(pixel)] = radius2.sqrt() / footprints[slot];
+        }
+    }
+    // A distance transform in two passes: Borgefors, «Distance transformations in digital images», 1986.
+    let diagonal = SLOPE * std::f32::consts::SQRT_2;
+    let steps = [(-1, 0, SLOPE), (-1, -1, diagonal), (0, -1, SLOPE), (1, -1, diagonal)];
+    let mut pass = |number: usize, sign: isize| {
+        let (x, y) = ((number % width) as isize, (number / width) as isize);
+        for (dx, dy, growth) in steps {
+            let (x, y) = (x + sign * dx, y + sign * dy);
+            if (0..width as isize).contains(&x) && (0..height as isize).contains(&y) {
+                radii[number] = radii[number].min(radii[y as usize * width + x as usize] + growth);
+            }
+        }
+    };
+    (0..width * height).for_each(|number| pass(number, 1));
+    (0..width * height).rev().for_each(|number| pass(number, -1));
+    for (slot, pixel) in slots() {
+        let radius2 = (radii[place(pixel)] * footprints[slot]).powi(2);
+        if radius2 < statistics[slot].radius2_high {
+            statistics[slot].radius2_high = radius2;
+        }
+    }
+}
+
+/// Whether photons are to be dropped that no visible point wants: what is aimed needs to know what is wanted, and asking costs
+/// more than it saves where nearly all photons are.
+pub fn is_dropping_worth_it(landed: u64, kept: u64, aims: bool) -> bool {
+    aims || kept < landed - landed / 4
+}
+
+/// Mean flux of photons, mean of the channels; `None` of none.
+pub fn mean_flux(photons: &[Photon]) -> Option<f64> {
+    let flux = |photon: &Photon| {
+        photon.flux_direction[..3]
+            .iter()
+            .map(|&channel| f64::from(channel))
+            .sum::<f64>()
+            / 3.0
+    };
+    let sum: f64 = photons.iter().map(flux).sum();
+    (sum > 0.0).then(|| sum / photons.len() as f64)
+}
+
+/// The median of the radii before the first photon of the slots that have one; 0 where none has.
+pub fn median(statistics: &[Statistics]) -> f32 {
+    let mut radii2: Vec<f32> = statistics
+        .iter()
+        .map(|statistics| statistics.radius2_high)
+        .filter(|&radius2| radius2 > 0.0)
+        .collect();
+    if radii2.is_empty() {
+        return 0.0;
+    }
+    middle(&mut radii2).sqrt()
+}
+
+/// The median of at least one number.
+fn middle(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Automatic {
+    footprints: f32,
+    photons: usize,
+}
+
+/// A probe's footprint, and squared distances of the nearest photons on its object.
+struct Near {
+    footprint: f32,
+    distances2: Vec<f32>,
+}
+
+/// Chooses how many photons visible points should accept, so that noise and blur together are least, and R such that the
 /// median one does. With α = 2/3 the squares of both fall alike, so that the choice holds for any number of iterations.
-pub fn automatic(visible_points: &[VisiblePoint], photons: &[Photon]) -> Automatic {
-    let distances2 = nearest(visible_points, photons);
+fn automatic(
+    visible_points: &[VisiblePoint],
+    footprints: &[f32],
+    photons: &[&Photon],
+    most_photons: usize,
+) -> Automatic {
+    let probes = nearest(visible_points, footprints, photons);
     let choice = CANDIDATES
         .into_iter()
-        .filter_map(|count| Some((error2(&distances2, count)?, count)))
+        .filter(|&count| count <= most_photons)
+        .filter_map(|count| Some((error2(&probes, count)?, count)))
         .min_by(|a, b| a.0.total_cmp(&b.0));
     let Some((_, photons)) = choice else {
         return Automatic {
-            radius2: WITHOUT_PHOTONS,
+            footprints: f32::INFINITY,
             photons: CANDIDATES[0],
         };
     };
-    let mut radii2: Vec<f32> = distances2
+    let mut ratios: Vec<f32> = probes
         .iter()
-        .filter_map(|near| near.get(photons - 1))
-        .copied()
+        .filter_map(|near| Some(near.distances2.get(photons - 1)?.sqrt() / near.footprint))
         .collect();
-    let middle = radii2.len() / 2;
-    let (_, radius2, _) = radii2.select_nth_unstable_by(middle, f32::total_cmp);
     Automatic {
-        radius2: *radius2,
+        footprints: middle(&mut ratios),
         photons,
     }
 }
 
 /// Squared relative error of densities from the nearest `count` photons: 1/count of noise, and of blur what they differ
 /// from those of the first candidate. `None` if no probe has so many photons.
-fn error2(distances2: &[Vec<f32>], count: usize) -> Option<f64> {
+fn error2(probes: &[Near], count: usize) -> Option<f64> {
     let fewest = CANDIDATES[0];
-    let ratios: Vec<f64> = distances2
+    let ratios: Vec<f64> = probes
         .iter()
+        .map(|near| &near.distances2)
         .filter_map(|near| Some((near[fewest - 1], *near.get(count - 1)?)))
         .map(|(few, all)| count as f64 * f64::from(few) / (fewest as f64 * f64::from(all)))
         .collect();
@@ -76,17 +193,18 @@ fn error2(distances2: &[Vec<f32>], count: usize) -> Option<f64> {
     Some(1.0 / all + (squares / ratios.len() as f64 - by_chance).max(0.0))
 }
 
-/// Of some visible points, the squared distances of the nearest photons on their object, if there are as many as the first
-/// candidate.
-fn nearest(visible_points: &[VisiblePoint], photons: &[Photon]) -> Vec<Vec<f32>> {
+/// Of some visible points, the nearest photons on their object, if there are as many as the first candidate.
+fn nearest(visible_points: &[VisiblePoint], footprints: &[f32], photons: &[&Photon]) -> Vec<Near> {
     let most = CANDIDATES[CANDIDATES.len() - 1];
+    let object_of = |photon: &Photon| photon.position_object[3].to_bits() & !CAUSTIC;
     let positions: Vec<[f32; 3]> = photons
         .iter()
         .map(|photon| [0, 1, 2].map(|axis| photon.position_object[axis]))
         .collect();
-    let seen: Vec<&VisiblePoint> = visible_points
+    let seen: Vec<_> = visible_points
         .iter()
-        .filter(|point| point.position_object[3].to_bits() != NO_OBJECT)
+        .zip(footprints)
+        .filter(|(point, _)| point.position_object[3].to_bits() != NO_OBJECT)
         .collect();
     if positions.is_empty() {
         return Vec::new();
@@ -95,7 +213,7 @@ fn nearest(visible_points: &[VisiblePoint], photons: &[Photon]) -> Vec<Vec<f32>>
         return Vec::new();
     };
     let step = seen.len().div_ceil(PROBES).max(1);
-    let probes = seen.iter().step_by(step).map(|point| {
+    let probes = seen.iter().step_by(step).map(|&(point, &footprint)| {
         let position = [0, 1, 2].map(|axis| point.position_object[axis]);
         let object = point.position_object[3].to_bits();
         let found = tree
@@ -104,11 +222,17 @@ fn nearest(visible_points: &[VisiblePoint], photons: &[Photon]) -> Vec<Vec<f32>>
             .execute();
         let on_object = found
             .iter()
-            .filter(|near| photons[near.item as usize].position_object[3].to_bits() == object);
-        on_object.map(|near| near.distance).take(most).collect::<Vec<f32>>()
+            .filter(|near| object_of(photons[near.item as usize]) == object);
+        Near {
+            footprint,
+            distances2: on_object.map(|near| near.distance).take(most).collect(),
+        }
     });
     // A photon at the very point says nothing of densities.
-    let enough = |near: &Vec<f32>| near.get(CANDIDATES[0] - 1).is_some_and(|&distance2| distance2 > 0.0);
+    let enough = |near: &Near| {
+        let least = near.distances2.get(CANDIDATES[0] - 1);
+        least.is_some_and(|&distance2| distance2 > 0.0)
+    };
     probes.filter(enough).collect()
 }
 
@@ -122,8 +246,10 @@ mod tests {
         pcg4d([index, 1, 2, 3]).map(|word| (word >> 8) as f32 / (1 << 24) as f32)
     }
 
+    const FOOTPRINT: f32 = 2e-3;
+
     /// On the unit square: visible points evenly, photons where `place` puts two random numbers.
-    fn choose(place: impl Fn(f32, f32) -> [f32; 2]) -> Automatic {
+    fn choose(place: impl Fn(f32, f32) -> [f32; 2]) -> First {
         let points: Vec<VisiblePoint> = (0..2000)
             .map(|i| {
                 let [x, y, ..] = random(1_000_000 + i);
@@ -144,12 +270,13 @@ mod tests {
                 }
             })
             .collect();
-        automatic(&points, &photons)
+        first(&points, &[FOOTPRINT; 2000], &photons, 1.0)[0]
     }
 
     #[test]
     fn even_photons_get_a_large_radius_and_it_holds_as_many() {
-        let Automatic { radius2, photons } = choose(|x, y| [x, y]);
+        let First { footprints, photons } = choose(|x, y| [x, y]);
+        let radius2 = (footprints * FOOTPRINT).powi(2);
         assert!(photons >= 48, "{photons} photons");
         let held = 20_000.0 * std::f32::consts::PI * radius2;
         assert!(
@@ -165,7 +292,8 @@ mod tests {
     }
 
     #[test]
-    fn without_photons_there_is_a_radius_all_the_same() {
-        assert_eq!(automatic(&[], &[]).radius2, WITHOUT_PHOTONS);
+    fn without_photons_the_footprints_bound_holds() {
+        let first = first(&[], &[], &[], 1.0).map(|first| first.footprints);
+        assert_eq!(first, MOST_FOOTPRINTS);
     }
 }

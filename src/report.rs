@@ -136,9 +136,12 @@ impl Profile {
         }
         let _ = writeln!(
             text,
-            "\nall stages {stages_us:.1} µs, submissions {wall_us:.1} µs of wall clock ({:.1} % of it in stages), {} iterations",
+            "\nall stages {stages_us:.1} µs, submissions {wall_us:.1} µs of wall clock ({:.1} % of it in stages), {} iterations\n\
+             {} photon paths, {}",
             100.0 * stages_us / wall_us,
-            self.runs.len()
+            self.runs.len(),
+            self.runs.len() as u64 * u64::from(subject.photons),
+            subject.counters.photons()
         );
         text
     }

@@ -30,20 +30,30 @@ pub enum BufferId {
     Lights,
     /// What shines from afar, and how directions are chosen from it; see `glsl/shared/environment.glsl`.
     Environment,
+    /// Where aimed photon paths start; see [`crate::emission::Table::texels`].
+    EmissionTable,
+    /// What each path of an iteration's first batch was worth, u32; see `glsl/stages/photons.comp`.
+    PathValues,
     /// [`crate::layout::VisiblePoint`]s in slot order.
     VisiblePoints,
     /// [`crate::layout::Gloss`] of each slot, where the scene has glossy surfaces.
     GlossOf,
-    /// [`crate::layout::Statistics`] of each slot.
+    /// [`crate::layout::Statistics`] of each slot, for each photon map.
     StatisticsOf,
-    /// [`crate::layout::Gathered`] of each slot.
+    /// [`crate::layout::Gathered`] of each slot, for each photon map.
     GatheredOf,
     /// [`crate::layout::DirectSum`] of each slot.
     DirectSums,
-    /// [`crate::layout::Coverage`] of each slot.
+    /// [`crate::layout::Coverage`] of each slot, for each photon map.
     CoverageOf,
-    /// [`crate::layout::RadiusSum`] of each share of the slots.
-    RadiusSums,
+    /// Side of each slot's pixel where its visible point is, f32.
+    Footprints,
+    /// R² that each slot gathers within in this iteration, f32, for each photon map.
+    Radii2,
+    /// What visible points want of photons in each cell, f32; see `glsl/shared/demand.glsl`.
+    Demand,
+    /// [`crate::layout::ShellRadii`] of each photon map's shells.
+    RadiiOfShells,
     /// [`crate::layout::Photon`]s as the lanes store them: number-major, `[number][lane]`.
     LanePhotons,
     /// Photons that each lane stored, u32.
@@ -96,7 +106,7 @@ pub enum BufferId {
     ProbeFrom,
     /// Where it copies it to.
     ProbeTo,
-    /// Photons tested for each slot, u32, where they are counted; the highest bit says that the slot had its turn.
+    /// Photons tested for each slot, for each photon map, u32, where they are counted; the highest bit says that the slot had its turn.
     TestsOf,
     /// Sort keys, u32.
     Keys,
@@ -114,6 +124,8 @@ pub enum BufferId {
     ScanTotal,
     /// RGBA f32 picture, row-major from the top left.
     Film,
+    /// [`crate::layout::BehindGlass`] of each pixel, row-major from the top left.
+    GlassFilm,
     /// [`crate::layout::StatusCounters`].
     Status,
 

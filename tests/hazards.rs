@@ -44,6 +44,7 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
             ..RenderConfig::default()
         };
         let limits = Limits {
+            specular: false,
             storage_buffer_bytes,
             loop_limit: u32::MAX,
             lanes: 4096,

@@ -93,6 +93,29 @@ fn imports_go_downward() {
                 "crate::gather",
             ],
         ),
+        ("alias.rs", &["crate::"]),
+        (
+            "random",
+            &[
+                "crate::emission",
+                "crate::scene",
+                "crate::gpu",
+                "crate::record",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+            ],
+        ),
+        (
+            "emission",
+            &[
+                "crate::gpu",
+                "crate::record",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+            ],
+        ),
         ("cpu", &["crate::gpu", "crate::pipeline", "crate::cli"]),
         (
             "scene",

@@ -4,6 +4,8 @@
 //! from independent samples, so many that a right program fails a comparison with a probability of 1e-8 or less. The
 //! other bounds the known bias by the photons' radius, from the geometry; each test says how. Seeds are fixed.
 
+#[path = "right/aimed.rs"]
+mod aimed;
 #[path = "right/camera.rs"]
 mod camera;
 #[path = "right/coat.rs"]

@@ -1,5 +1,10 @@
 // Where photon paths start. Include after random.glsl, environment.glsl and light.glsl.
 
+// Paths are aimed at what was found to be worth it, or start in proportion to the lights' power.
+layout(constant_id = 24) const bool AIMED = false;
+
+#include "emission_table.glsl"
+
 struct Emission {
     vec3 origin;
     vec3 direction;
@@ -8,16 +13,51 @@ struct Emission {
     float inverse_range; // of a punctual light
 };
 
-// From a disc across the direction of flight that covers the scene.
-vec3 origin_afar(vec3 centre, vec3 direction, float area, vec2 u) {
-    return centre + basis(direction) * vec3(sqrt(area / PI) * disc_point(u), 0.0);
-}
+// What paths are to pass through.
+struct Target {
+    bool everything; // that the light shines on
+    vec4 sphere;
+};
+
+const Target EVERYTHING = Target(true, vec4(0.0));
+
+// A start, and what is to be known of it to tell which targets it meets.
+struct AimedStart {
+    Emission emission;
+    vec3 passed;    // a point of the ray
+    bool from_afar; // that has no beginning
+    bool on_target; // by the way it was chosen
+};
 
 // A direction around an axis, with 1 − cos of the angle between them.
 vec3 direction_off(vec3 axis, float versine, float turn) {
     float across = sqrt(max(0.0, versine * (2.0 - versine)));
     float phi = 2.0 * PI * turn;
     return normalize(basis(axis) * vec3(across * cos(phi), across * sin(phi), 1.0 - versine));
+}
+
+// A direction uniform in a cone around an axis, with 1 − cos of the angle between its sides and the axis.
+vec3 direction_in_cone(vec3 axis, float versine, vec2 u) {
+    vec2 p = disc_point(u);
+    float off = dot(p, p) * versine;
+    return normalize(basis(axis) * vec3(p * sqrt(max(0.0, versine * (2.0 - off))), 1.0 - off));
+}
+
+// The cone in which a sphere is seen.
+struct Cone {
+    vec3 axis;
+    float versine; // 1 − cos of the angle between its sides and the axis; 2 from inside the sphere
+};
+
+Cone cone_of(vec4 sphere, vec3 from) {
+    vec3 way = sphere.xyz - from;
+    float distance2 = dot(way, way);
+    float radius2 = sphere.w * sphere.w;
+    if (distance2 <= radius2) {
+        return Cone(vec3(0.0, 0.0, 1.0), 2.0);
+    }
+    float sin2 = radius2 / distance2;
+    return Cone(way * inversesqrt(distance2), sin2 / (1.0 + sqrt(max(0.0, 1.0 - sin2))));
 }
 
 // 1 − cos of a photon's angle from a spot's axis, such that all photons have the same flux, and the solid angle that would
@@ -31,58 +71,165 @@ float spot_versine(PunctualLight light, float u, out float solid_angle) {
                                      : whole - from_outside;
 }
 
-Emission emit_punctual(PunctualLight light, uint kind, float area, vec2 place, vec2 direction) {
-    if (kind == DIRECTIONAL_LIGHT) {
-        return Emission(origin_afar(light.position, light.direction, area, place), light.direction,
-                        light.intensity * area, NO_TRIANGLE, 0.0);
+AimedStart emit_directional(PunctualLight light, float area, vec2 place, Target target) {
+    // A disc across the rays that covers the target, or the scene.
+    vec3 centre = target.everything ? light.position : target.sphere.xyz;
+    float radius = target.everything ? sqrt(area / PI) : target.sphere.w;
+    vec3 passed = centre + basis(light.direction) * vec3(radius * disc_point(place), 0.0);
+    // From a plane before the scene.
+    vec3 origin = passed;
+    if (!target.everything) {
+        area = PI * radius * radius;
+        origin -= light.direction * dot(passed - light.position, light.direction);
     }
-    float solid_angle = 4.0 * PI;
-    float versine = 2.0 * direction.x;
-    vec3 axis = vec3(0.0, 0.0, 1.0);
-    if (kind == SPOT_LIGHT) {
-        versine = spot_versine(light, direction.x, solid_angle);
-        axis = light.direction;
-    }
-    return Emission(light.position, direction_off(axis, versine, direction.y), light.intensity * solid_angle,
-                    NO_TRIANGLE,
-                    light.inverse_range);
+    return AimedStart(Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0), passed, true, true);
 }
 
-Emission emit_environment(float area, vec2 place, vec2 direction) {
+AimedStart emit_environment(float area, vec2 place, vec2 direction, Target target) {
     vec3 towards;
     Sky sky = sample_environment(direction, towards);
-    return Emission(origin_afar(towards * sqrt(area / PI), -towards, area, place), -towards,
-                    sky.radiance * (area / sky.density), NO_TRIANGLE, 0.0);
+    // The sphere around the scene has the disc across the light that `area` is.
+    float scene_radius = sqrt(area / PI);
+    float radius = target.everything ? scene_radius : target.sphere.w;
+    vec3 passed = target.sphere.xyz + basis(-towards) * vec3(radius * disc_point(place), 0.0);
+    vec3 origin = passed + towards * (scene_radius - dot(target.sphere.xyz, towards));
+    float disc = target.everything ? area : PI * radius * radius;
+    return AimedStart(Emission(origin, -towards, sky.radiance * (disc / sky.density), NO_TRIANGLE, 0.0), passed, true,
+                      true);
+}
+
+AimedStart emit_point(PunctualLight light, uint kind, vec2 u, Target target) {
+    Cone cone = Cone(vec3(0.0, 0.0, 1.0), 2.0);
+    if (!target.everything) {
+        cone = cone_of(target.sphere, light.position);
+    }
+    float solid_angle = 2.0 * PI * cone.versine;
+    vec3 intensity = light.intensity;
+    vec3 direction;
+    bool on_target = true;
+    float spot_solid_angle = 0.0;
+    float versine = 0.0;
+    if (kind == SPOT_LIGHT) {
+        versine = spot_versine(light, u.x, spot_solid_angle);
+    }
+    if (kind == SPOT_LIGHT && (target.everything || solid_angle >= spot_solid_angle)) {
+        solid_angle = spot_solid_angle;
+        direction = direction_off(light.direction, versine, u.y);
+        on_target = false;
+    } else if (target.everything) {
+        direction = direction_off(cone.axis, 2.0 * u.x, u.y);
+    } else {
+        direction = direction_in_cone(cone.axis, cone.versine, u);
+        if (kind == SPOT_LIGHT) {
+            vec3 off_axis = direction - light.direction;
+            intensity *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
+        }
+    }
+    return AimedStart(Emission(light.position, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range),
+                      light.position, false, on_target);
+}
+
+// Where a sphere takes up more than this of the directions, sin² of its cone's angle, they are chosen by their cosine.
+const float WIDE_CONE = 0.5;
+
+AimedStart emit_triangle(Light light, vec2 place, vec2 u, float side, Target target) {
+    PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
+    Surface emitter = surface_at(triangle, triangle_point(place));
+    Material material = material_of(emitter);
+    vec3 normal = emitter.geometric_normal;
+    bool both_sides = emits(material, false);
+    if (both_sides && side < 0.5) {
+        normal = -normal;
+    }
+    float sides = both_sides ? 2.0 : 1.0;
+    vec3 origin = offset_origin(emitter.position, normal, emitter.reach);
+    vec3 way = target.sphere.xyz - origin;
+    bool in_cone = !target.everything && target.sphere.w * target.sphere.w < WIDE_CONE * dot(way, way);
+    vec3 direction;
+    float projected; // solid angle times cosine, of directions as dense as this one
+    if (in_cone) {
+        Cone cone = cone_of(target.sphere, origin);
+        direction = direction_in_cone(cone.axis, cone.versine, u);
+        projected = max(0.0, dot(direction, normal)) * 2.0 * PI * cone.versine;
+    } else {
+        direction = cosine_direction(normal, u);
+        projected = PI;
+    }
+    vec3 flux = emitted_radiance(material, max(0.0, dot(direction, normal))) *
+                (projected * sides * light.area * share_there(emitter));
+    return AimedStart(Emission(origin, direction, flux, triangle, 0.0), origin, false, in_cone);
+}
+
+// From a light towards a target; flux over the density of the coordinates' choice.
+AimedStart emit_from(uint index, vec2 place, vec2 direction, float side, Target target) {
+    Light light = light_at(index);
+    if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
+        PunctualLight punctual = punctual_light_at(index);
+        if (light.kind == DIRECTIONAL_LIGHT) {
+            return emit_directional(punctual, light.area, place, target);
+        }
+        return emit_point(punctual, light.kind, direction, target);
+    }
+    if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
+        return emit_environment(light.area, place, direction, target);
+    }
+    return emit_triangle(light, place, direction, side, target);
+}
+
+// A sphere that is seen within less than this, sin² of its cone's angle, is worth aiming at from a matte surface.
+const float NARROW_CONE = 0.25;
+
+// From a matte surface outside of what the camera sees hardly a photon finds there, and those that do carry the flux of all:
+// half of them are aimed there. Gives the direction in place of the cosine's, and what the flux is to be weighed with: cosine
+// over the density of both ways together, at most 2.
+float guide(vec3 position, vec3 normal, vec4 u, inout vec3 outgoing) {
+    EmissionTableSize size = emission_table_size();
+    if (size.view >= size.targets) {
+        return 1.0;
+    }
+    vec4 sphere = target_sphere(size.view);
+    vec3 way = sphere.xyz - position;
+    if (sphere.w * sphere.w >= NARROW_CONE * dot(way, way) || dot(way, normal) <= -sphere.w) {
+        return 1.0;
+    }
+    Cone cone = cone_of(sphere, position);
+    bool aimed = u.w < 0.5;
+    outgoing = aimed ? direction_in_cone(cone.axis, cone.versine, u.xy) : outgoing;
+    vec3 off = outgoing - cone.axis;
+    bool inside = aimed || 0.5 * dot(off, off) <= cone.versine;
+    float by_cosine = max(0.0, dot(outgoing, normal)) / PI;
+    float by_aim = inside ? 1.0 / (2.0 * PI * cone.versine) : 0.0;
+    return by_cosine > 0.0 ? 2.0 * by_cosine / (by_cosine + by_aim) : 0.0;
+}
+
+// A path without flux where another target comes before the one that it was chosen for.
+Emission emit_aimed(vec4 u, vec4 w) {
+    EmissionTableSize size = emission_table_size();
+    Start start = choose_start(size, u, w);
+    if (start.weight == 0.0) {
+        // Not to be traced, see emission::Aim.
+        return Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0);
+    }
+    Target target = EVERYTHING;
+    if (start.target < size.targets) {
+        target = Target(false, target_sphere(start.target));
+    }
+    AimedStart aimed = emit_from(start.light, start.place, start.direction, w.y, target);
+    Emission emission = aimed.emission;
+    bool kept = meets_first(size, start.target, aimed.on_target, aimed.passed, emission.direction, aimed.from_afar);
+    emission.flux *= kept ? start.weight / start.probability : 0.0;
+    return emission;
 }
 
 Emission emit(inout Random random) {
     // Place and direction are one point of four dimensions: what is left of the number that chose the light is the first.
     vec4 u = next4(random);
     vec4 w = next4(random);
-    Choice choice = choose_light(u.x, w.xz);
-    vec2 place = vec2(choice.rest, u.y);
-    Light light = light_at(choice.light);
-    Emission emission;
-    if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
-        emission = emit_punctual(punctual_light_at(choice.light), light.kind, light.area, place, u.zw);
-    } else if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
-        emission = emit_environment(light.area, place, u.zw);
-    } else {
-        PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
-        Surface emitter = surface_at(triangle, triangle_point(place));
-        Material material = material_of(emitter);
-        vec3 normal = emitter.geometric_normal;
-        bool both_sides = emits(material, false);
-        if (both_sides && w.y < 0.5) {
-            normal = -normal;
-        }
-        float sides = both_sides ? 2.0 : 1.0;
-        vec3 direction = cosine_direction(normal, u.zw);
-        emission = Emission(offset_origin(emitter.position, normal, emitter.reach), direction,
-                            emitted_radiance(material, dot(direction, normal)) *
-                                (PI * sides * light.area * share_there(emitter)),
-                            triangle, 0.0);
+    if (AIMED) {
+        return emit_aimed(u, w);
     }
-    emission.flux /= light.probability;
+    Choice choice = choose_light(u.x, w.xz);
+    Emission emission = emit_from(choice.index, vec2(choice.rest, u.y), u.zw, w.y, EVERYTHING).emission;
+    emission.flux /= light_at(choice.index).probability;
     return emission;
 }

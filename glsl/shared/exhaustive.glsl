@@ -14,6 +14,7 @@ layout(push_constant) uniform Push {
     uint stride; // only every stride-th group of visible points is gathered for: 1 but in a bench
     uint groups; // that are gathered for
     uint factor; // see group_of_workgroup
+    uint map;    // of photons
 } push;
 
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
@@ -39,7 +40,8 @@ uvec2 photons_to_test(uint object) {
     }
     uvec2 range = uvec2(0u, photon_count);
     if (BY_MESH) {
-        range = uvec2(object == 0u ? 0u : mesh_ends[object - 1u], mesh_ends[object]);
+        uint mesh = object & ~CAUSTIC;
+        range = uvec2(mesh == 0u ? 0u : mesh_ends[mesh - 1u], mesh_ends[mesh]);
     }
     range = uvec2(max(range.x, push.first), min(range.y, push.end));
     return uvec2(range.x, max(range.x, range.y));

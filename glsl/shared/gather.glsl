@@ -4,17 +4,17 @@
 layout(constant_id = 0) const bool COUNT_TESTS = false;
 
 uniform usamplerBuffer VisiblePoints;
-uniform usamplerBuffer StatisticsOf;
+uniform usamplerBuffer Radii2;
 uniform usamplerBuffer GlossOf;
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
-layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot, where they are counted
+layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot and map, where they are counted
 const uint GATHERED_FOR = 0x80000000u;           // and whether it was its turn
 
 // The gather's side of a visible point.
 struct Receiver {
     vec3 position;
     float radius2;
-    uint object; // NO_OBJECT where there is no visible point
+    uint object; // with its map's bit, as photons have it; NO_OBJECT where there is no visible point
     vec3 normal; // of any length
     // Of glossy scenes.
     vec3 shading_normal;
@@ -25,13 +25,20 @@ struct Receiver {
 const Receiver NO_RECEIVER = Receiver(vec3(0.0), -1.0, NO_OBJECT, vec3(0.0), vec3(0.0), vec3(0.0),
                                       NO_REFLECTOR);
 
-Receiver receiver_at(uint slot) {
+// R² of a slot for a photon map.
+float radius2_at(uint slot, uint map) {
+    uint i = map * slots() + slot;
+    return TEXEL(Radii2, i >> 2u)[i & 3u];
+}
+
+Receiver receiver_at(uint slot, uint map) {
     vec4 position_object = TEXEL(VisiblePoints, 3u * slot);
     vec4 weight_normal = TEXEL(VisiblePoints, 3u * slot + 1u);
     Receiver receiver = NO_RECEIVER;
     receiver.position = position_object.xyz;
-    receiver.radius2 = TEXEL(StatisticsOf, 3u * slot).x;
+    receiver.radius2 = radius2_at(slot, map);
     receiver.object = floatBitsToUint(position_object.w);
+    receiver.object |= receiver.object != NO_OBJECT && map == 1u ? CAUSTIC : 0u;
     receiver.normal = decode_octahedral(floatBitsToUint(weight_normal.w));
     if (GLOSSY) {
         Gloss gloss = GLOSS(slot);
@@ -48,7 +55,7 @@ float squared_distance(vec3 a, vec3 b) {
     return d2;
 }
 
-// The one predicate of every gather: on the same object, within R, and arriving on the side that the viewer sees.
+// The one predicate of every gather: on the same object, of the same map, within R, and arriving on the side that the viewer sees.
 bool accepts(Receiver receiver, Photon photon, out float distance2) {
     precise float cosine = dot(decode_octahedral(floatBitsToUint(photon.flux_direction.w)), receiver.normal);
     distance2 = squared_distance(photon.position_object.xyz, receiver.position);
@@ -81,12 +88,13 @@ void gather(Receiver receiver, Photon photon, inout Sum sum) {
     sum.moment += accepted ? mean_of(flux) * distance2 : 0.0;
 }
 
-void add_gathered(uint slot, Sum sum, uint tested) {
-    vec4 before = gathered[slot].flux_count;
-    gathered[slot].flux_count =
+void add_gathered(uint slot, uint map, Sum sum, uint tested) {
+    uint i = map * slots() + slot;
+    vec4 before = gathered[i].flux_count;
+    gathered[i].flux_count =
         vec4(before.rgb + sum.flux, uintBitsToFloat(floatBitsToUint(before.w) + sum.count));
-    gathered[slot].moment += sum.moment;
+    gathered[i].moment += sum.moment;
     if (COUNT_TESTS) {
-        tests[slot] = (tests[slot] + tested) | GATHERED_FOR;
+        tests[i] = (tests[i] + tested) | GATHERED_FOR;
     }
 }

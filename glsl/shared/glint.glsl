@@ -46,7 +46,7 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
     // Apart from the path's own numbers: those are the same where there is nothing to ask.
     vec3 u = vec3(of_passage(random, FIRST_OF_GLINT), of_passage(random, FIRST_OF_GLINT + 1u),
                   of_passage(random, FIRST_OF_GLINT + 2u));
-    uint chosen = choose_light(u.x, u.yz).light;
+    uint chosen = choose_light(u.x, u.yz).index;
     bool of_one = settings.slots_per_pixel == 1u;
     uint begin = of_one ? chosen : 0u;
     uint end = of_one ? chosen + 1u : settings.light_count;

@@ -1,11 +1,37 @@
-// A hashed uniform grid: cells of one size, as many as space needs, that share a table of 2^cell_bits buckets. A block of
+// Hashed uniform grids: cells of one size, as many as space needs, that share a table of 2^cell_bits buckets. A block of
 // 16×4×4 cells lies together in the table and each of its rows of 16 cells along x is contiguous, so that the photons of
 // neighbouring cells of a row are one range of the sorted photons.
+//
+// Radii grow with the distance from the camera, as footprints do. So space is divided into shells around it, each four times
+// as large as the one within, and each shell of each photon map has a grid of its own cell size. Include after settings.glsl.
+
+const uint SHELLS = 8u;
 
 // Set on the device for each iteration, from the radii that the visible points have then.
 struct GridShape {
-    float inverse_cell_size;
+    float inverse_cell_size[2u * SHELLS]; // of each photon map's shells
 };
+
+// The shell at a squared distance from the camera. Render space is 2 long: what is farther away than 4 is in the outermost.
+uint shell_at(float distance2) {
+    int exponent = int(floatBitsToUint(distance2) >> 23u) - 127;
+    return uint(clamp((exponent + 28) >> 2, 0, int(SHELLS) - 1));
+}
+
+uint shell_of(vec3 position) {
+    precise vec3 d = position - settings.camera_position.xyz;
+    precise float distance2 = d.x * d.x + d.y * d.y + d.z * d.z;
+    return shell_at(distance2);
+}
+
+// The first and the last shell that a ball reaches.
+uvec2 shells_of(vec3 position, float radius) {
+    float distance = length(position - settings.camera_position.xyz);
+    float slack = 1e-6 * (distance + radius); // more than both ends are rounded
+    float nearest = max(distance - radius - slack, 0.0);
+    float farthest = distance + radius + slack;
+    return uvec2(shell_at(nearest * nearest), shell_at(farthest * farthest));
+}
 
 const uint ROW_BITS = 4u;  // log2 of a row's cells
 const uint SIDE_BITS = 2u; // log2 of a block's rows along y, and along z
@@ -19,10 +45,10 @@ ivec3 row_of(ivec3 cell) {
     return ivec3(cell.x >> ROW_BITS, cell.yz);
 }
 
-// The bucket of a row's first cell.
-uint bucket_of_row(ivec3 row) {
+// The bucket of the first cell of a row of a grid, which is map · SHELLS + shell.
+uint bucket_of_row(ivec3 row, uint grid) {
     uvec3 block = uvec3(row.x, row.yz >> SIDE_BITS);
-    uint hash = block.x * 0x9e3779b1u ^ block.y * 0x85ebca77u ^ block.z * 0xc2b2ae3du;
+    uint hash = block.x * 0x9e3779b1u ^ block.y * 0x85ebca77u ^ block.z * 0xc2b2ae3du ^ grid * 0x27d4eb2fu;
     hash ^= hash >> 15u;
     hash *= 0x2c1b3c6du;
     hash ^= hash >> 13u;
@@ -31,6 +57,6 @@ uint bucket_of_row(ivec3 row) {
     return number << ROW_BITS & ((1u << settings.cell_bits) - 1u);
 }
 
-uint bucket_of(ivec3 cell) {
-    return bucket_of_row(row_of(cell)) | uint(cell.x) & ((1u << ROW_BITS) - 1u);
+uint bucket_of(ivec3 cell, uint grid) {
+    return bucket_of_row(row_of(cell), grid) | uint(cell.x) & ((1u << ROW_BITS) - 1u);
 }

@@ -1,5 +1,7 @@
 // Lights. Include after scene.glsl.
 
+#include "alias_table.glsl"
+
 const uint TRIANGLE_LIGHT = 0u;
 const uint POINT_LIGHT = 1u;
 const uint SPOT_LIGHT = 2u;
@@ -14,7 +16,7 @@ struct Light {
     uint kind;
 };
 
-// The rest of `layout::Light`, without the table's cell.
+// The rest of `layout::Light`, without the second texel: the table's cell, and the light's place within its source.
 struct PunctualLight {
     vec3 intensity;      // point, spot: along the axis. Directional: irradiance across the rays
     vec3 position;       // directional: centre of the disc
@@ -45,30 +47,10 @@ bool is_punctual(uint kind) {
     return kind == POINT_LIGHT || kind == SPOT_LIGHT || kind == DIRECTIONAL_LIGHT;
 }
 
-// A light, and what is left of the number that chose it, uniform in [0, 1].
-struct Choice {
-    uint light;
-    float rest;
-};
-
-// By the alias method: Vose, «A Linear Algorithm For Generating Random Numbers With a Given Distribution», IEEE
-// Transactions on Software Engineering 17(9), 1991. u has 24 bits, and the two `digits` below it as many again: a light
-// of one photon in 10¹² is then chosen as often as it should be.
 Choice choose_light(float u, vec2 digits) {
-    uvec3 bits = uvec3(vec3(u, digits) * 16777216.0);
-    // A fraction of 64 bits times the number of cells: the cell, and a fraction of 64 bits within it.
-    uint cell, part, carried, lower_part, carry;
-    umulExtended(bits.x << 8u | bits.y >> 16u, settings.light_count, cell, part);
-    umulExtended(bits.y << 16u | bits.z >> 8u, settings.light_count, carried, lower_part);
-    part = uaddCarry(part, carried, carry);
-    cell += carry;
-    float within = float(part) * (1.0 / 4294967296.0) + float(lower_part) * (1.0 / 4294967296.0 / 4294967296.0);
-    vec4 entry = TEXEL(Lights, LIGHT_TEXELS * cell + 1u);
-    float accept = entry.x;
-    if (within < accept || accept >= 1.0) {
-        return Choice(cell, min(within / accept, 1.0));
-    }
-    return Choice(floatBitsToUint(entry.y), min((within - accept) / (1.0 - accept), 1.0));
+    AliasPlace place = alias_place(settings.light_count, u, digits);
+    vec4 entry = TEXEL(Lights, LIGHT_TEXELS * place.cell + 1u);
+    return alias_choice(place, entry.x, floatBitsToUint(entry.y));
 }
 
 // Whether light leaves on the triangle's front, or on its back.

@@ -8,15 +8,23 @@ mat3 basis(vec3 n) {
     return mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n);
 }
 
-// A point uniform on the unit disc.
+// A point uniform on the unit disc: Shirley and Chiu, «A Low Distortion Map Between Disk and Square», Journal of Graphics
+// Tools 2(3), 1997. A small square of numbers stays compact.
 vec2 disc_point(vec2 u) {
-    float phi = 2.0 * PI * u.y;
-    return sqrt(u.x) * vec2(cos(phi), sin(phi));
+    vec2 p = 2.0 * u - 1.0;
+    if (p.x == 0.0 && p.y == 0.0) {
+        return vec2(0.0);
+    }
+    bool wide = abs(p.x) > abs(p.y);
+    float radius = wide ? p.x : p.y;
+    float phi = wide ? 0.25 * PI * (p.y / p.x) : 0.5 * PI - 0.25 * PI * (p.x / p.y);
+    return radius * vec2(cos(phi), sin(phi));
 }
 
 // A direction around the unit vector n with density cos θ / π (Malley's method).
 vec3 cosine_direction(vec3 n, vec2 u) {
-    return normalize(basis(n) * vec3(disc_point(u), sqrt(max(0.0, 1.0 - u.x))));
+    vec2 p = disc_point(u);
+    return normalize(basis(n) * vec3(p, sqrt(max(0.0, 1.0 - dot(p, p)))));
 }
 
 // Barycentric coordinates (u, v) of a point uniform on a triangle.

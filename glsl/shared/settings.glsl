@@ -16,7 +16,13 @@ layout(std140) uniform Settings {
     uint photon_capacity;       // photons that a batch can store
     uint cell_bits;             // log2 of the cells of the hashed grid
     float alpha;                // eq. 2
-    float initial_radius2;      // R² of a visible point before its first photon, render units
+    float initial_radius2;      // the user's R² before the first photon, render units; 0 where it follows the footprints
     uint loop_limit;            // iterations that all loops of an invocation may make together
     float bsdf_sampling;        // probability that direct light is sampled by a direction of the BSDF, not a light's point
+    vec2 first_footprints;      // R before the first photon in footprints, global and caustic photons
+    vec2 most_footprints;       // R at the most; 0: no bound
+    uint photon_maps;           // 2 where caustic photons are gathered apart from the others, else 1
+    float pixel_spread;         // side of a pixel's footprint at distance 1 along a path, or anywhere where rays are parallel
+    float demand_floor2;        // beside the squared radiance where what visible points want of photons is weighed
+    uint padding;
 } settings;

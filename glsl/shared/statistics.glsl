@@ -28,27 +28,61 @@ float curvature(Gathered gathered, float radius2) {
     return mean_of(gathered.flux_count.rgb) - 2.0 * gathered.moment / radius2;
 }
 
-// Radiance that a visible point's path saw directly, summed over the iterations, two-float; w: unused.
+// Radiance that a visible point's path saw directly, summed over the iterations, two-float. high.w: mean of the channels of
+// what lights behind glass would have added if the glass didn't bend their light, which photons alone bring, summed over the
+// iterations that asked for it; low.w: their number.
 struct DirectSum {
     vec4 high;
     vec4 low;
 };
 
-// Of the discs around a visible point, how much can have photons, in sixteenths.
+// Of the discs around a visible point, how much can have photons, in sixteenths; and in how many iterations a ray from a
+// point that had none yet met something that may send it some.
 struct Coverage {
     uint covered;
     uint asked;
+    uint surrounded;
+    uint padding;
 };
+
+// Of a pixel, what tells whether it has its part of the light behind glass.
+struct BehindGlass {
+    float unbent;   // radiance that it would have of that light if the glass didn't bend it
+    float arrived;  // mean of the channels of the radiance that such photons gave it
+    float photons;  // their number
+    float radius;   // R, in pixels
+    float radius2;  // R², render units
+};
+
+// Photons that a visible point has accepted, as far as 32 bits hold. What may have brought light behind glass are those of the
+// last photon map: the caustic ones, or all where nothing tells them apart.
+uint photons_of(uint accepted_low, uint accepted_high) {
+    return accepted_high != 0u ? 0xffffffffu : accepted_low;
+}
+
+// Of what lies behind glass, the mean of the iterations that asked.
+float unbent_of(DirectSum sum) {
+    return sum.low.w > 0.0 ? sum.high.w / sum.low.w : 0.0;
+}
 
 // Their share; 1 where nothing is known of it.
 float share_of(Coverage coverage) {
     return coverage.covered > 0u ? float(coverage.covered) / float(coverage.asked) : 1.0;
 }
 
-// Sums over radii: the grid's cell size follows from them.
-struct RadiusSum {
-    float radius2;  // Σ R²
-    float inverse2; // Σ 1/R²
-    uint count;
+// Of the radii of discs in a shell of a grid, see grid.glsl; its cell size follows from them.
+struct ShellRadii {
+    uint logs;    // Σ of what `radius_log` makes of a sample of them
+    uint count;   // of that sample
+    uint largest; // bits of the largest R² of all
     uint padding;
 };
+
+// log2 of a radius, offset, in parts of 256: sums of integers don't depend on their order.
+uint radius_log(float radius2) {
+    return uint(clamp(0.5 * log2(max(radius2, 1e-37)) + 64.0, 0.0, 127.0) * 256.0 + 0.5);
+}
+
+float mean_radius(ShellRadii radii) {
+    return exp2(float(radii.logs) / float(radii.count) / 256.0 - 64.0);
+}

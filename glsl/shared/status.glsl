@@ -10,6 +10,10 @@ struct StatusCounters {
     uint photons_stored_high;
     uint lost_photons;        // beyond the maximum that a user set for a grid cell
     uint full_cells;          // cells that had more
+    uint photons_landed_low;  // where visible points could be, wanted or not; 64 bits
+    uint photons_landed_high;
+    uint photons_accepted_low; // by visible points of the picture, in all iterations; 64 bits
+    uint photons_accepted_high;
 };
 
 layout(std430) buffer Status { StatusCounters status; };

@@ -31,3 +31,8 @@ uint pixel_slots() {
 uint slots() {
     return pixel_slots() * settings.slots_per_pixel;
 }
+
+// What gathers photons: each slot for each photon map, map-major.
+uint receiver_count() {
+    return slots() * settings.photon_maps;
+}

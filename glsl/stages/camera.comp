@@ -35,6 +35,7 @@ layout(push_constant) uniform Push {
 } push;
 
 layout(std430) writeonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+layout(std430) writeonly buffer Footprints { float footprints[]; };
 layout(std430) writeonly buffer GlossOf { Gloss gloss_of_slots[]; };
 
 struct Branch {
@@ -42,6 +43,7 @@ struct Branch {
     vec3 direction;
     vec3 throughput;
     vec3 emitted;
+    float way; // from the camera so far
     uint depth;
     PlacedTriangle ignored;
     uint medium;          // material that it is in, or VACUUM
@@ -126,6 +128,7 @@ void main() {
     branch.direction = normalize(branch.direction);
     branch.throughput = vec3(1.0);
     branch.emitted = vec3(0.0);
+    branch.way = 0.0;
     branch.depth = 0u;
     branch.ignored = NO_TRIANGLE;
     branch.medium = VACUUM;
@@ -149,6 +152,7 @@ void main() {
             Surface surface = met.surface;
             Material material = met.material;
             Facing facing = met.facing;
+            branch.way += hit.t;
             bool culled = CULLING && branch.depth == 0u && !facing.front && (material.flags & BACK_HIDDEN) != 0u;
             if (culled) {
                 // What lies behind isn't there by the same chance again.
@@ -280,6 +284,7 @@ void main() {
         if (ended) {
             visible_point.emitted_normal.rgb = branch.emitted;
             visible_points[pixel_slot * SLOTS + used] = visible_point;
+            footprints[pixel_slot * SLOTS + used] = settings.pixel_spread * (parallel ? 1.0 : branch.way);
             if (GLOSSY) {
                 gloss_of_slots[pixel_slot * SLOTS + used] = gloss;
             }

@@ -2,7 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 // How much of the disc of radius R around each visible point can have photons: past the edge of the object, or inside
 // an opaque one that stands on it, there are none. Random points of the disc say whether it can; their share corrects eq. 4,
-// which takes the whole disc.
+// which takes the whole disc. As long as a point has had no photon, a ray into its hemisphere says whether it lies in the open,
+// where none has to come.
 
 layout(local_size_x = 64) in;
 
@@ -28,10 +29,15 @@ layout(push_constant) uniform Push {
 
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer StatisticsOf;
+uniform usamplerBuffer GatheredOf;
+layout(std430) readonly buffer Radii2 { float radii2[]; };
 layout(std430) buffer CoverageOf { Coverage coverage[]; };
 
 // What an iteration counts for, whatever its points.
 const uint WHOLE = 16u;
+// A disc that has been covered in so many iterations, and wholly, is asked for in every eighth one alone, as its
+// neighbours are: discs only shrink.
+const uint TRUSTED = 4u;
 // Surfaces that are crossed on the way at the most.
 const uint MOST_CROSSINGS = 4u;
 
@@ -105,17 +111,65 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     return there.object == object && share_there(there) > 0.0;
 }
 
+// Whether a ray meets something, past glass, that may scatter light or mirror it.
+bool is_surrounded(VisiblePoint visible_point, vec2 u) {
+    vec3 n = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
+    vec3 origin = offset_origin(visible_point.position_object.xyz, n, reach_of(floatBitsToUint(visible_point.position_object.w)));
+    vec3 direction = cosine_direction(n, u);
+    PlacedTriangle ignored = NO_TRIANGLE;
+    bool scatters = false;
+    for (uint i = 0u; i <= MOST_CROSSINGS && !scatters; i++) {
+        Hit hit = trace(origin, direction, 1e30, ignored, false);
+        if (hit.triangle == MISS) {
+            break;
+        }
+        Surface surface = surface_at(hit);
+        Material material = material_at(surface.material);
+        bool passes = is_dielectric(material) || (surface.flags & SEE_THROUGH) != 0u;
+        if (!passes) {
+            scatters = !(is_matte(material) && largest(material.base_color) == 0.0);
+            break;
+        }
+        origin = origin_towards(surface, direction);
+        ignored = triangle_of(hit);
+    }
+    return scatters;
+}
+
+bool has_caustic_photons(uint slot) {
+    uvec2 accepted = uvec2(0u);
+    if (settings.photon_maps > 1u) {
+        accepted = TEXEL_BITS(StatisticsOf, 3u * (slots() + slot)).zw;
+    }
+    return (accepted.x | accepted.y) != 0u;
+}
+
 void main() {
-    uint slot = invocation_index();
-    if (slot >= slots() || status.again != 0u) {
+    uint receiver = invocation_index();
+    if (receiver >= receiver_count() || status.again != 0u) {
         return;
     }
+    uint slot = receiver % slots();
     VisiblePoint visible_point = VISIBLE_POINT(slot);
     if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
         return;
     }
+    // Without photons there is nothing to correct.
+    uvec2 accepted = TEXEL_BITS(StatisticsOf, 3u * receiver).zw;
+    bool has_photons = (accepted.x | accepted.y | TEXEL_BITS(GatheredOf, 2u * receiver).w) != 0u;
+    Coverage before = coverage[receiver];
+    bool trusted = before.covered == before.asked && before.asked >= TRUSTED * WHOLE;
     Random random = random_of_pixel(COVERAGE_SAMPLE, slot, push.iteration, push.block, settings.seed);
-    float radius = sqrt(TEXEL(StatisticsOf, 3u * slot).x);
+    if (!has_photons && receiver < slots() && before.surrounded == 0u && !has_caustic_photons(slot)) {
+        Random behind = random;
+        behind.dimension = WHOLE; // those of the disc
+        bool surrounded = is_surrounded(visible_point, next4(behind).xy) && !loops_cut;
+        coverage[receiver].surrounded = surrounded ? 1u : 0u;
+    }
+    if (!has_photons || (trusted && (push.iteration + slot / 64u) % 8u != 0u)) {
+        return;
+    }
+    float radius = sqrt(radii2[receiver]);
     uint covered = 0u;
     for (uint i = 0u; i < push.points; i++) {
         Random sample_random = sample_of(random, i, push.points);
@@ -125,6 +179,6 @@ void main() {
     if (loops_cut) {
         covered = push.points;
     }
-    coverage[slot].covered += covered * (WHOLE / push.points);
-    coverage[slot].asked += WHOLE;
+    coverage[receiver].covered = before.covered + covered * (WHOLE / push.points);
+    coverage[receiver].asked = before.asked + WHOLE;
 }

@@ -1,7 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Adds what each visible point's path saw of the lights: by itself and, unless photons carry direct light too, by one
-// ray towards a light.
+// ray towards a light. Where glass alone stands between, photons have to bring that light: what it would be unbent is kept,
+// since it says what a picture without them doesn't have. That takes more rays: points that have photons ask now and then.
 
 layout(local_size_x = 64) in;
 
@@ -25,6 +26,7 @@ layout(local_size_x = 64) in;
 #include "status.glsl"
 
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
+layout(constant_id = 24) const bool ASKS_BEHIND_GLASS = true; // in this iteration, see config::RenderConfig
 
 layout(push_constant) uniform Push {
     uint iteration;
@@ -33,10 +35,29 @@ layout(push_constant) uniform Push {
 
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer GlossOf;
+uniform usamplerBuffer StatisticsOf;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 
 // A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
 const float ENDS_BEFORE = 16.0 / 16777216.0;
+
+// Glass surfaces that are crossed on the way to a light at the most.
+const uint MOST_CROSSINGS = 8u;
+// Photons from which on a point asks for what lies behind glass in the first of so many iterations alone.
+const uint SEASONED = 16u;
+const uint ASKS_EVERY = 32u;
+
+// Whether a shadow ray that ends on glass goes on.
+bool asks_behind_glass(uint slot) {
+    bool asks = false;
+    if (ASKS_BEHIND_GLASS) {
+        vec4 statistics = TEXEL(StatisticsOf, 3u * ((settings.photon_maps - 1u) * slots() + slot));
+        uvec2 accepted = floatBitsToUint(statistics.zw);
+        bool has_few = photons_of(accepted.x, accepted.y) < SEASONED;
+        asks = DIELECTRICS && (push.iteration % ASKS_EVERY == 0u || has_few);
+    }
+    return asks;
+}
 
 // A ray that asks a light whether it is seen.
 struct Question {
@@ -51,7 +72,7 @@ struct Question {
 
 // Towards a light that u.x chooses.
 Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
-    uint chosen = choose_light(u.x, digits).light;
+    uint chosen = choose_light(u.x, digits).index;
     Light light = light_at(chosen);
     Question question;
     question.kind = light.kind;
@@ -79,7 +100,9 @@ Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
 // One ray, by chance towards a point of a light or along a direction of the BSDF, with the density of both together
 // (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
 // variance next to a light. No direction of the BSDF meets a punctual light.
-vec3 sample_direct(VisiblePoint visible_point, uint slot) {
+// behind_glass: glass stands before the light, so that this is what it would bring unbent.
+vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool behind_glass) {
+    behind_glass = false;
     Random random = random_of_pixel(LIGHT_SAMPLE, slot, push.iteration, push.block, settings.seed);
     vec4 u = next4(random);
     // What chooses among many lights needs more digits.
@@ -118,9 +141,34 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
     if (dot(ray, geometric_normal) <= 0.0 || dot(ray, shading_normal) <= 0.0) {
         return vec3(0.0);
     }
-    Hit hit = trace_visible(origin, ray, question.end, question.ignored, !by_bsdf, random);
+    Hit hit;
+    vec3 from = origin;
+    float passed = 0.0;
+    vec3 tint = vec3(1.0);
+    uint crossings = 0u;
+    bool any = !by_bsdf;
+    bool goes_on = true;
+    while (goes_on) {
+        hit = trace_visible(from, ray, question.end - passed, question.ignored, any, random);
+        goes_on = ASKS_BEHIND_GLASS && asks && hit.triangle != MISS && !loops_cut && crossings < MOST_CROSSINGS;
+        if (goes_on) {
+            ShadingTriangle triangle = shading_triangle(hit.triangle);
+            Material glass = material_at(triangle.material);
+            goes_on = is_dielectric(glass) && !(by_bsdf && triangle.light != NO_LIGHT);
+            // Of any hits the first one isn't known: the ray starts anew.
+            if (goes_on && !any) {
+                Surface met = surface_at(hit);
+                behind_glass = true;
+                tint *= glass.base_color;
+                from = origin_towards(met, ray);
+                passed = dot(from - origin, ray) / dot(ray, ray);
+                crossings += 1u;
+            }
+            any = false;
+        }
+    }
     if (loops_cut) {
-        atomicAdd(status.cut_paths, 1u);
+        atomicAdd(status.cut_paths, behind_glass ? 0u : 1u);
         return vec3(0.0);
     }
     bool missed = hit.triangle == MISS;
@@ -178,7 +226,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot) {
         }
     }
     float density = punctual ? 1.0 - bsdf_sampling : mix(of_light, of_bsdf, bsdf_sampling);
-    return weight * radiance * (cos_surface / density);
+    return weight * radiance * (cos_surface / density) * tint;
 }
 
 void main() {
@@ -188,8 +236,17 @@ void main() {
     }
     VisiblePoint visible_point = VISIBLE_POINT(slot);
     vec3 radiance = visible_point.emitted_normal.rgb;
+    float unbent = 0.0;
+    bool asks = false;
     if (SAMPLE_LIGHTS && floatBitsToUint(visible_point.position_object.w) != NO_OBJECT) {
-        radiance += sample_direct(visible_point, slot);
+        bool behind_glass;
+        asks = asks_behind_glass(slot);
+        vec3 sampled = sample_direct(visible_point, slot, asks, behind_glass);
+        if (behind_glass) {
+            unbent = finite(sampled) ? mean_of(sampled) : 0.0;
+        } else {
+            radiance += sampled;
+        }
     }
     if (!finite(radiance)) {
         atomicAdd(status.non_finite, 1u);
@@ -199,5 +256,7 @@ void main() {
     add_to(sum.high.r, sum.low.r, radiance.r);
     add_to(sum.high.g, sum.low.g, radiance.g);
     add_to(sum.high.b, sum.low.b, radiance.b);
+    sum.high.w += unbent;
+    sum.low.w += asks ? 1.0 : 0.0;
     direct_sums[slot] = sum;
 }

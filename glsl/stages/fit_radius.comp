@@ -11,20 +11,25 @@ layout(local_size_x = 64) in;
 #include "statistics.glsl"
 
 layout(push_constant) uniform Push {
-    float wanted; // photons
+    vec2 wanted; // photons of each map
+    float least; // footprints that R has at least
 } push;
 
+layout(std430) readonly buffer Footprints { float footprints[]; };
 layout(std430) buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 
 void main() {
-    uint slot = invocation_index();
-    if (slot >= slots()) {
+    uint i = invocation_index();
+    if (i >= receiver_count()) {
         return;
     }
-    float found = float(floatBitsToUint(gathered[slot].flux_count.w));
-    if (found > push.wanted) {
-        statistics[slot].radius2_high *= push.wanted / found;
+    float found = float(floatBitsToUint(gathered[i].flux_count.w));
+    float wanted = push.wanted[i / slots()];
+    if (found > wanted) {
+        float least = push.least * footprints[i % slots()];
+        float radius2 = statistics[i].radius2_high;
+        statistics[i].radius2_high = max(radius2 * (wanted / found), min(radius2, least * least));
     }
-    gathered[slot] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
+    gathered[i] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
 }

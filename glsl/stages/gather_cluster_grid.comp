@@ -24,6 +24,7 @@ layout(push_constant) uniform Push {
     uint end;
     uint groups; // of visible points
     uint factor; // see group_of_workgroup
+    uint map;    // of photons
 } push;
 
 layout(std430) readonly buffer ObjectCells { uint cell_starts[]; };
@@ -38,7 +39,7 @@ void main() {
     uint slot = group == NO_SLOT ? NO_SLOT : point_order[group * gl_WorkGroupSize.x + me];
     Receiver receiver = NO_RECEIVER;
     if (slot != NO_SLOT) {
-        receiver = receiver_at(slot);
+        receiver = receiver_at(slot, push.map);
     }
     bool filler = receiver.object == NO_OBJECT;
     // A little more than R, so that rounding can't leave out the cell of a photon at distance R.
@@ -56,7 +57,7 @@ void main() {
     if (filler) {
         return;
     }
-    ObjectGrid grid = object_grid(receiver.object);
+    ObjectGrid grid = object_grid(receiver.object & ~CAUSTIC);
     uvec3 low = cell_in(grid, lows[0]);
     uvec3 high = cell_in(grid, highs[0]);
     Sum sum = NOTHING;
@@ -81,5 +82,5 @@ void main() {
     if (tested != to_test || rows != (high.y - low.y + 1u) * (high.z - low.z + 1u)) {
         atomicOr(status.again, GATHERS_TOO_LONG);
     }
-    add_gathered(slot, sum, tested);
+    add_gathered(slot, push.map, sum, tested);
 }

@@ -38,29 +38,26 @@ uint cell_start(uint bucket) {
 
 void main() {
     // Neighbours in a run are neighbours in the picture; a pixel's several points lie in several runs.
-    uint run = invocation_index();
+    uint runs_of_map = slots() / RUN;
+    uint map = invocation_index() / runs_of_map;
+    uint run = invocation_index() % runs_of_map;
     uint first_slot = run / settings.slots_per_pixel * RUN * settings.slots_per_pixel + run % settings.slots_per_pixel;
-    if (first_slot >= slots()) {
+    if (map >= settings.photon_maps) {
         return;
     }
-    float inverse = grid.inverse_cell_size;
     Receiver receivers[RUN];
-    ivec3 lows[RUN];
-    ivec3 highs[RUN];
+    uvec2 shells[RUN];
     Sum sums[RUN];
     uint tested_for[RUN];
-    bool pending[RUN];
-    bool any_pending = false;
+    uvec2 all_shells = uvec2(SHELLS, 0u);
     for (uint k = 0u; k < RUN; k++) {
-        receivers[k] = receiver_at(first_slot + k * settings.slots_per_pixel);
-        // A little more than R, so that rounding can't leave out the cell of a photon at distance R.
-        float reach = sqrt(receivers[k].radius2) * 1.000001 + 1e-7;
-        lows[k] = cell_of(receivers[k].position - reach, inverse);
-        highs[k] = cell_of(receivers[k].position + reach, inverse);
+        receivers[k] = receiver_at(first_slot + k * settings.slots_per_pixel, map);
+        shells[k] = receivers[k].object == NO_OBJECT
+                        ? uvec2(SHELLS, 0u)
+                        : shells_of(receivers[k].position, sqrt(receivers[k].radius2));
+        all_shells = uvec2(min(all_shells.x, shells[k].x), max(all_shells.y, shells[k].y));
         sums[k] = NOTHING;
         tested_for[k] = 0u;
-        pending[k] = receivers[k].object != NO_OBJECT;
-        any_pending = any_pending || pending[k];
     }
     // What the loops have to do, and have done.
     uint points = 0u;
@@ -69,79 +66,98 @@ void main() {
     uint rows_done = 0u;
     uint to_test = 0u;
     uint tested = 0u;
-    for (uint k = 0u; k < RUN; k++) {
-        points += pending[k] ? 1u : 0u;
-    }
-    while (any_pending) {
-        // The first point that is left, and those whose cells reach no more than one farther than it or they do alone.
-        any_pending = false;
-        bool chosen = false;
-        ivec3 low = ivec3(0);
-        ivec3 high = ivec3(-1);
-        Receiver cluster[RUN];
+    uint shells_done = 0u;
+    for (uint shell = all_shells.x; shell <= all_shells.y; shell++) {
+        uint of_shell = map * SHELLS + shell;
+        float inverse = grid.inverse_cell_size[of_shell];
+        ivec3 lows[RUN];
+        ivec3 highs[RUN];
+        bool pending[RUN];
+        bool any_pending = false;
         for (uint k = 0u; k < RUN; k++) {
-            bool leads = pending[k] && !chosen;
-            ivec3 new_low = leads ? lows[k] : min(low, lows[k]);
-            ivec3 new_high = leads ? highs[k] : max(high, highs[k]);
-            ivec3 extent = max(high - low, highs[k] - lows[k]);
-            bool joins = leads || (pending[k] && all(lessThanEqual(new_high - new_low, extent + 1)));
-            low = joins ? new_low : low;
-            high = joins ? new_high : high;
-            cluster[k] = receivers[k];
-            cluster[k].radius2 = joins ? receivers[k].radius2 : -1.0;
-            chosen = chosen || leads;
-            points_done += joins ? 1u : 0u;
-            pending[k] = pending[k] && !joins;
+            // A little more than R, so that rounding can't leave out the cell of a photon at distance R.
+            float reach = sqrt(receivers[k].radius2) * 1.000001 + 1e-7;
+            lows[k] = cell_of(receivers[k].position - reach, inverse);
+            highs[k] = cell_of(receivers[k].position + reach, inverse);
+            pending[k] = shells[k].x <= shell && shell <= shells[k].y;
+            points += pending[k] ? 1u : 0u;
             any_pending = any_pending || pending[k];
         }
-        uint tested_before = tested;
-        ivec3 first_row = row_of(low);
-        ivec3 last_row = row_of(high);
-        ivec3 extent = last_row - first_row + 1;
-        rows += uint(extent.x * extent.y * extent.z);
-        ivec3 row = first_row;
-        bool more;
-        // Loops that test at their end: some drivers carry out a loop's body once more than its condition holds.
-        do {
-            uint bucket = bucket_of_row(row);
-            int row_begin = row.x << ROW_BITS;
-            uint from = bucket + uint(max(low.x - row_begin, 0));
-            uint past = bucket + uint(min(high.x + 1 - row_begin, 1 << ROW_BITS));
-            uint i = max(cell_start(from), push.first);
-            uint end = min(cell_start(past), push.end);
-            to_test += max(end, i) - i;
-            do {
-                Photon photon = PHOTON(SortedPhotons, i);
-                // Rows that share a bucket must not be counted twice.
-                bool here = i < end && row_of(cell_of(photon.position_object.xyz, inverse)) == row;
-                // No receiver is on that object.
-                photon.position_object.w = here ? photon.position_object.w : uintBitsToFloat(NO_OBJECT - 1u);
-                for (uint k = 0u; k < RUN; k++) {
-                    gather(cluster[k], photon, sums[k]);
-                }
-                tested += i < end ? 1u : 0u;
-                i += 1u;
-            } while (i < end);
-            rows_done += 1u;
-            bool end_x = row.x == last_row.x;
-            bool end_y = end_x && row.y == last_row.y;
-            more = !(end_y && row.z == last_row.z);
-            row = ivec3(end_x ? first_row.x : row.x + 1, end_y ? first_row.y : row.y + (end_x ? 1 : 0),
-                        row.z + (end_y ? 1 : 0));
-        } while (more);
-        if (COUNT_TESTS) {
+        while (any_pending) {
+            // The first point that is left, and those whose cells reach no more than one farther than it or they do alone.
+            any_pending = false;
+            bool chosen = false;
+            ivec3 low = ivec3(0);
+            ivec3 high = ivec3(-1);
+            Receiver cluster[RUN];
             for (uint k = 0u; k < RUN; k++) {
-                tested_for[k] += cluster[k].radius2 >= 0.0 ? tested - tested_before : 0u;
+                bool leads = pending[k] && !chosen;
+                ivec3 new_low = leads ? lows[k] : min(low, lows[k]);
+                ivec3 new_high = leads ? highs[k] : max(high, highs[k]);
+                ivec3 extent = max(high - low, highs[k] - lows[k]);
+                bool joins = leads || (pending[k] && all(lessThanEqual(new_high - new_low, extent + 1)));
+                low = joins ? new_low : low;
+                high = joins ? new_high : high;
+                cluster[k] = receivers[k];
+                cluster[k].radius2 = joins ? receivers[k].radius2 : -1.0;
+                chosen = chosen || leads;
+                points_done += joins ? 1u : 0u;
+                pending[k] = pending[k] && !joins;
+                any_pending = any_pending || pending[k];
+            }
+            uint tested_before = tested;
+            ivec3 first_row = row_of(low);
+            ivec3 last_row = row_of(high);
+            ivec3 extent = last_row - first_row + 1;
+            rows += uint(extent.x * extent.y * extent.z);
+            ivec3 row = first_row;
+            bool more;
+            // Loops that test at their end: some drivers carry out a loop's body once more than its condition holds.
+            do {
+                uint bucket = bucket_of_row(row, of_shell);
+                int row_begin = row.x << ROW_BITS;
+                uint from = bucket + uint(max(low.x - row_begin, 0));
+                uint past = bucket + uint(min(high.x + 1 - row_begin, 1 << ROW_BITS));
+                uint i = max(cell_start(from), push.first);
+                uint end = min(cell_start(past), push.end);
+                to_test += max(end, i) - i;
+                do {
+                    Photon photon = PHOTON(SortedPhotons, i);
+                    vec3 position = photon.position_object.xyz;
+                    // Rows that share a bucket must not be counted twice.
+                    bool here = i < end && row_of(cell_of(position, inverse)) == row && shell_of(position) == shell;
+                    // No receiver is on that object.
+                    photon.position_object.w = here ? photon.position_object.w : uintBitsToFloat(NO_OBJECT - 1u);
+                    for (uint k = 0u; k < RUN; k++) {
+                        gather(cluster[k], photon, sums[k]);
+                    }
+                    tested += i < end ? 1u : 0u;
+                    i += 1u;
+                } while (i < end);
+                rows_done += 1u;
+                bool end_x = row.x == last_row.x;
+                bool end_y = end_x && row.y == last_row.y;
+                more = !(end_y && row.z == last_row.z);
+                row = ivec3(end_x ? first_row.x : row.x + 1, end_y ? first_row.y : row.y + (end_x ? 1 : 0),
+                            row.z + (end_y ? 1 : 0));
+            } while (more);
+            if (COUNT_TESTS) {
+                for (uint k = 0u; k < RUN; k++) {
+                    tested_for[k] += cluster[k].radius2 >= 0.0 ? tested - tested_before : 0u;
+                }
             }
         }
+        shells_done += 1u;
     }
+    uint shells_wanted = all_shells.x <= all_shells.y ? all_shells.y + 1u - all_shells.x : 0u;
     // Loops that didn't reach their end were cut by the driver: the gather is done again in smaller parts.
-    if (tested != to_test || rows_done != rows || points_done != points) {
+    if (tested != to_test || rows_done != rows || points_done != points ||
+        shells_done != shells_wanted) {
         atomicOr(status.again, GATHERS_TOO_LONG);
     }
     for (uint k = 0u; k < RUN; k++) {
         if (receivers[k].object != NO_OBJECT) {
-            add_gathered(first_slot + k * settings.slots_per_pixel, sums[k], tested_for[k]);
+            add_gathered(first_slot + k * settings.slots_per_pixel, map, sums[k], tested_for[k]);
         }
     }
 }

@@ -26,7 +26,7 @@ void main() {
     uint slot = slot_at(me);
     Receiver receiver = NO_RECEIVER;
     if (slot != NO_SLOT) {
-        receiver = receiver_at(slot);
+        receiver = receiver_at(slot, push.map);
     }
     if (me == 0u) {
         receivers = 0u;
@@ -57,6 +57,6 @@ void main() {
         barrier();
     }
     if (receiver.object != NO_OBJECT) {
-        add_gathered(slot, sum, range.y - range.x);
+        add_gathered(slot, push.map, sum, range.y - range.x);
     }
 }

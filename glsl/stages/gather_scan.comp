@@ -24,12 +24,12 @@ void main() {
     if (push.first >= photon_count || slot == NO_SLOT) {
         return;
     }
-    Receiver receiver = receiver_at(slot);
+    Receiver receiver = receiver_at(slot, push.map);
     uvec2 range = photons_to_test(receiver.object);
     float radius = sqrt(receiver.radius2);
     Sum sum = NOTHING;
     for (uint i = range.x; i < range.y; i++) {
         test(receiver, radius, PHOTON(GatheredFrom, i), sum);
     }
-    add_gathered(slot, sum, range.y - range.x);
+    add_gathered(slot, push.map, sum, range.y - range.x);
 }

@@ -7,6 +7,7 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "texel.glsl"
+#include "photon.glsl"
 #include "grid.glsl"
 
 layout(std430) readonly buffer Grid { GridShape grid; };
@@ -21,7 +22,9 @@ void main() {
     if (i >= photon_count) {
         return;
     }
-    uint bucket = bucket_of(cell_of(TEXEL(Photons, 2u * i).xyz, grid.inverse_cell_size));
+    vec4 position_object = TEXEL(Photons, 2u * i);
+    uint of_shell = map_of(position_object) * SHELLS + shell_of(position_object.xyz);
+    uint bucket = bucket_of(cell_of(position_object.xyz, grid.inverse_cell_size[of_shell]), of_shell);
     keys[i] = bucket;
     values[i] = i;
     atomicAdd(cell_photons[bucket], 1u);

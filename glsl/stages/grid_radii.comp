@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Sums up the radii of a sample of the visible points: the grid's cell size follows from them.
+// How large the discs are in each shell of each photon map: the cell sizes of the grids follow from that.
 
 layout(local_size_x = 64) in;
 
@@ -9,28 +9,36 @@ layout(local_size_x = 64) in;
 #include "texel.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
-#include "radius_sums.glsl"
+#include "grid.glsl"
 
 layout(push_constant) uniform Push {
-    uint groups;
-    uint step; // every how many slots
+    uint step; // of every how many slots the mean is taken
 } push;
 
 uniform usamplerBuffer VisiblePoints;
-uniform usamplerBuffer StatisticsOf;
-layout(std430) writeonly buffer RadiusSums { RadiusSum radius_sums[]; };
+uniform usamplerBuffer Radii2;
+layout(std430) buffer RadiiOfShells { ShellRadii radii_of_shells[]; }; // cleared before
 
 void main() {
-    RadiusSum term = RadiusSum(0.0, 0.0, 0u, 0u);
-    uint step = push.groups * gl_WorkGroupSize.x * push.step;
-    for (uint slot = invocation_index() * push.step; slot < slots(); slot += step) {
-        if (floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w) != NO_OBJECT) {
-            float radius2 = TEXEL(StatisticsOf, 3u * slot).x;
-            term = together(term, RadiusSum(radius2, 1.0 / radius2, 1u, 0u));
+    uint i = invocation_index();
+    if (i >= receiver_count()) {
+        return;
+    }
+    vec4 position_object = TEXEL(VisiblePoints, 3u * (i % slots()));
+    if (floatBitsToUint(position_object.w) == NO_OBJECT) {
+        return;
+    }
+    float radius2 = TEXEL(Radii2, i >> 2u)[i & 3u];
+    uint first_shell = i / slots() * SHELLS;
+    uvec2 shells = shells_of(position_object.xyz, sqrt(radius2));
+    for (uint shell = first_shell + shells.x; shell <= first_shell + shells.y; shell++) {
+        if (floatBitsToUint(radius2) > radii_of_shells[shell].largest) {
+            atomicMax(radii_of_shells[shell].largest, floatBitsToUint(radius2));
         }
     }
-    RadiusSum sum = reduce(term);
-    if (gl_LocalInvocationID.x == 0u && workgroup_index() < push.groups) {
-        radius_sums[workgroup_index()] = sum;
+    if (i % push.step == 0u) {
+        uint shell = first_shell + shell_of(position_object.xyz);
+        atomicAdd(radii_of_shells[shell].logs, radius_log(radius2));
+        atomicAdd(radii_of_shells[shell].count, 1u);
     }
 }

@@ -6,6 +6,7 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "texel.glsl"
+#include "photon.glsl"
 
 uniform usamplerBuffer Photons;
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
@@ -14,6 +15,6 @@ layout(std430) buffer MeshEnds { uint mesh_ends[]; }; // cleared before
 void main() {
     uint i = invocation_index();
     if (i < photon_count) {
-        atomicAdd(mesh_ends[TEXEL_BITS(Photons, 2u * i).w], 1u);
+        atomicAdd(mesh_ends[object_of(TEXEL(Photons, 2u * i))], 1u);
     }
 }

@@ -18,6 +18,6 @@ void main() {
     uint i = invocation_index();
     if (i < photon_count) {
         Photon photon = PHOTON(Photons, i);
-        sorted_photons[atomicAdd(mesh_ends[floatBitsToUint(photon.position_object.w)], 1u)] = photon;
+        sorted_photons[atomicAdd(mesh_ends[object_of(photon.position_object)], 1u)] = photon;
     }
 }

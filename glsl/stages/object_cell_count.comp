@@ -6,6 +6,7 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "texel.glsl"
+#include "photon.glsl"
 #include "object_grid.glsl"
 
 uniform usamplerBuffer Photons;
@@ -16,7 +17,7 @@ void main() {
     uint i = invocation_index();
     if (i < photon_count) {
         vec4 position_object = TEXEL(Photons, 2u * i);
-        ObjectGrid grid = object_grid(floatBitsToUint(position_object.w));
+        ObjectGrid grid = object_grid(object_of(position_object));
         atomicAdd(cell_photons[cell_number(grid, cell_in(grid, position_object.xyz))], 1u);
     }
 }

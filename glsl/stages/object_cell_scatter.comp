@@ -22,7 +22,7 @@ void main() {
         return;
     }
     Photon photon = PHOTON(Photons, i);
-    ObjectGrid grid = object_grid(floatBitsToUint(photon.position_object.w));
+    ObjectGrid grid = object_grid(object_of(photon.position_object));
     uint cell = cell_number(grid, cell_in(grid, photon.position_object.xyz));
     uint place = cell_starts[cell] + atomicAdd(cursors[cell], 1u);
     // A full cell has no place left.

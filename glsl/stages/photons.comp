@@ -23,9 +23,12 @@ layout(local_size_x = 64) in;
 #include "light.glsl"
 #include "emission.glsl"
 #include "photon.glsl"
+#include "grid.glsl"
+#include "demand.glsl"
 #include "status.glsl"
 
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
+layout(constant_id = 25) const bool DROP_UNWANTED = true; // photons that no visible point can accept aren't stored
 
 layout(push_constant) uniform Push {
     uint iteration;
@@ -35,9 +38,12 @@ layout(push_constant) uniform Push {
     uint path_count;
 } push;
 
+layout(std430) readonly buffer Grid { GridShape grid; };
+uniform usamplerBuffer Demand;
 layout(std430) writeonly buffer LanePhotons { Photon lane_photons[]; };
 layout(std430) writeonly buffer LaneCounts { uint lane_counts[]; };
 layout(std430) writeonly buffer LaneOffsets { uint lane_offsets[]; }; // the same, to be summed up
+layout(std430) writeonly buffer PathValues { uint path_values[]; }; // of an iteration's first batch
 
 struct Path {
     vec3 origin;
@@ -47,7 +53,8 @@ struct Path {
     PlacedTriangle ignored;
     uint medium; // material that it is in, or VACUUM
     float wavelength; // nm; 0: of all
-    bool seen_directly; // no specular bounce since the light: direct light, which `direct` samples
+    bool seen_directly; // no bounce since the light: direct light, which `direct` samples
+    bool caustic;       // mirrors and glass alone since the light
     float inverse_range; // of the light, until the first surface
 };
 
@@ -62,6 +69,7 @@ Path start(inout Random random) {
     path.medium = VACUUM;
     path.wavelength = 0.0;
     path.seen_directly = true;
+    path.caustic = true;
     path.inverse_range = emission.inverse_range;
     return path;
 }
@@ -77,12 +85,31 @@ bool survives(inout vec3 flux, vec3 scattered, float u) {
     return true;
 }
 
+// What visible points want of a photon: see `demand`.
+float demand_at(vec3 position, uint object, uint map) {
+    uint of_shell = map * SHELLS + shell_of(position);
+    ivec3 cell = cell_of(position, grid.inverse_cell_size[of_shell] * (1.0 / COARSENING));
+    uint entry = demand_entry(cell, of_shell, object);
+    return TEXEL(Demand, entry >> 2u)[entry & 3u];
+}
+
+// What a path was worth, and the rays that it traced, for where later ones are aimed; see emission::PathValue. One that was
+// rejected at its start has neither.
+void note_value(uint path, float value, uint rays) {
+    if (AIMED && push.first_path == 0u) {
+        path_values[path] = (floatBitsToUint(value) << 1u & 0xffffff00u) | min(rays, 255u);
+    }
+}
+
 void main() {
     uint lane = invocation_index();
     if (lane >= settings.photon_lanes) {
         return;
     }
     uint stored = 0u;
+    uint landed = 0u;
+    float value = 0.0; // of the path: squared errors that its photons make of the picture
+    uint rays = 0u;    // of the path
     uint next = lane;
     bool alive = false;
     Path path;
@@ -93,6 +120,9 @@ void main() {
     while (!loops_cut) {
         loop_count += 1u;
         if (!alive) {
+            if (next > lane) {
+                note_value(next - settings.photon_lanes, value, rays);
+            }
             if (next >= push.path_count) {
                 finished = true;
                 break;
@@ -100,12 +130,15 @@ void main() {
             random = random_of_photon(push.first_path + next, push.iteration, push.block, push.first_of_block,
                                       settings.seed);
             path = start(random);
+            value = 0.0;
+            rays = 0u;
             next += settings.photon_lanes;
             alive = largest(path.flux) > 0.0;
             if (!alive) {
                 continue;
             }
         }
+        rays += 1u;
         Hit hit = trace_visible(path.origin, path.direction, 1e30, path.ignored, false, random);
         if (loops_cut) {
             break;
@@ -140,15 +173,25 @@ void main() {
             if (!finite(landing)) {
                 non_finite += 1u;
             } else if (!(SAMPLE_LIGHTS && path.seen_directly)) {
-                if (stored < settings.lane_capacity) {
-                    Photon photon;
-                    photon.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
-                    // What is there in part is seen in part as well as met in part.
-                    photon.flux_direction = vec4(landing / share_there(surface),
-                                                 uintBitsToFloat(encode_direction(incoming)));
-                    lane_photons[stored * settings.photon_lanes + lane] = photon;
+                landed += 1u;
+                uint map = settings.photon_maps > 1u && path.caustic && !path.seen_directly ? 1u : 0u;
+                float wanted = 1.0;
+                if (DROP_UNWANTED) {
+                    wanted = demand_at(surface.position, surface.object, map);
                 }
-                stored += 1u;
+                if (wanted > 0.0) {
+                    float flux = (landing.r + landing.g + landing.b) * (1.0 / 3.0);
+                    value = min(value + wanted * flux * flux, 1e37);
+                    if (stored < settings.lane_capacity) {
+                        Photon photon;
+                        photon.position_object = vec4(surface.position, uintBitsToFloat(surface.object | map << 31u));
+                        // What is there in part is seen in part as well as met in part.
+                        photon.flux_direction = vec4(landing / share_there(surface),
+                                                     uintBitsToFloat(encode_direction(incoming)));
+                        lane_photons[stored * settings.photon_lanes + lane] = photon;
+                    }
+                    stored += 1u;
+                }
             }
         }
         path.seen_directly = false;
@@ -158,14 +201,22 @@ void main() {
             landing = path.flux * (layer * landing_correction(facing, incoming));
         }
         if (is_matte(material) || is_glossy(material)) {
+            path.caustic = false;
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             vec3 outgoing = cosine_direction(facing.geometric_normal, u.xy);
+            float guided = 1.0;
+            if (AIMED && is_matte(material)) {
+                guided = guide(surface.position, facing.geometric_normal, u, outgoing);
+            }
             vec3 scattered = landing * material.base_color;
             if (is_glossy(material)) {
                 scattered = landing * scatter(reflector_of(material), facing, -incoming, u, outgoing);
             }
             alive = dot(outgoing, facing.shading_normal) > 0.0 && finite(scattered) &&
                     survives(path.flux, scattered, u.z);
+            // Those that are aimed shall come there, with less flux each.
+            path.flux *= guided;
+            alive = alive && guided > 0.0;
             path.direction = outgoing;
         } else if (is_mirror(material)) {
             float cos_i = -dot(incoming, facing.shading_normal);
@@ -197,6 +248,10 @@ void main() {
     lane_counts[lane] = kept;
     lane_offsets[lane] = kept;
     atomicMax(status.lane_need, stored);
+    uint landed_before = atomicAdd(status.photons_landed_low, landed);
+    if (landed_before + landed < landed) {
+        atomicAdd(status.photons_landed_high, 1u);
+    }
     if (stored > settings.lane_capacity) {
         atomicOr(status.again, PHOTONS_DID_NOT_FIT);
     }

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Statistics before the first iteration.
+// Statistics before the first iteration. `radii` gives each slot its R.
 
 layout(local_size_x = 64) in;
 
@@ -13,9 +13,9 @@ layout(std430) writeonly buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) writeonly buffer GatheredOf { Gathered gathered[]; };
 
 void main() {
-    uint slot = invocation_index();
-    if (slot < slots()) {
-        statistics[slot] = Statistics(settings.initial_radius2, 0.0, 0u, 0u, vec4(0.0), vec4(0.0));
-        gathered[slot] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
+    uint i = invocation_index();
+    if (i < receiver_count()) {
+        statistics[i] = Statistics(0.0, 0.0, 0u, 0u, vec4(0.0), vec4(0.0));
+        gathered[i] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
     }
 }

@@ -1,12 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The paper's image synthesis: eq. 4 for each visible point, and the mean of what was seen directly.
+// The paper's image synthesis: eq. 4 for each visible point, and the mean of what was seen directly. And what tells how much light
+// behind glass no photon has brought yet.
 
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
+#include "texel.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
 #include "status.glsl"
@@ -16,10 +18,25 @@ layout(push_constant) uniform Push {
     float emitted; // photon paths of all iterations
 } push;
 
+uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
 layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
 layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left
+layout(std430) writeonly buffer GlassFilm { BehindGlass glass_film[]; }; // likewise
+
+// 64 bits: a carry of the low words is one more high one.
+void add_accepted(uint low, uint high) {
+    if ((low | high) != 0u) {
+        uint before = atomicAdd(status.photons_accepted_low, low);
+        atomicAdd(status.photons_accepted_high, high + (before + low < before ? 1u : 0u));
+    }
+}
+
+// How wide a pixel is at a visible point that is seen directly.
+float pixel_width(vec3 position) {
+    return settings.pixel_spread * (settings.camera_up.w != 0.0 ? 1.0 : length(position - settings.camera_position.xyz));
+}
 
 void main() {
     uint pixel_slot = invocation_index();
@@ -33,17 +50,36 @@ void main() {
     vec4 radiance = vec4(0.0); // w: as if the photons' curvature were their flux
     bool has_surface = false;
     bool has_photons = false;
+    BehindGlass glass = BehindGlass(0.0, 0.0, 0.0, 0.0, 0.0);
     for (uint i = 0u; i < settings.slots_per_pixel; i++) {
         uint slot = pixel_slot * settings.slots_per_pixel + i;
-        Statistics mine = statistics[slot];
         DirectSum sum = direct_sums[slot];
-        has_surface = has_surface || coverage[slot].asked > 0u;
-        has_photons = has_photons || (mine.accepted_low | mine.accepted_high) != 0u;
         // The quotient of flux and emitted photons comes first: both grow without bound, it doesn't.
         radiance.rgb += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
-        if (mine.radius2_high > 0.0) {
-            float area = PI * mine.radius2_high * share_of(coverage[slot]);
-            radiance += (mine.flux_high + mine.flux_low) / push.emitted / area;
+        glass.unbent += unbent_of(sum);
+        has_surface = has_surface || coverage[slot].surrounded > 0u;
+        VisiblePoint visible_point = VISIBLE_POINT(slot);
+        bool lies_behind_glass =
+            sum.high.w > 0.0 && floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
+        for (uint map = 0u; map < settings.photon_maps; map++) {
+            uint receiver = map * slots() + slot;
+            Statistics mine = statistics[receiver];
+            bool through_glass = map + 1u == settings.photon_maps;
+            add_accepted(mine.accepted_low, mine.accepted_high);
+            has_photons = has_photons || (mine.accepted_low | mine.accepted_high) != 0u;
+            if (mine.radius2_high > 0.0) {
+                float area = PI * mine.radius2_high * share_of(coverage[receiver]);
+                vec4 by_photons = (mine.flux_high + mine.flux_low) / push.emitted / area;
+                radiance += by_photons;
+                glass.arrived += through_glass ? mean_of(by_photons.rgb) : 0.0;
+            }
+            if (lies_behind_glass && through_glass) {
+                // Of several slots, what the one with the most photons has.
+                glass.photons = max(glass.photons, float(photons_of(mine.accepted_low, mine.accepted_high)));
+                float radius = sqrt(mine.radius2_high) / pixel_width(visible_point.position_object.xyz);
+                glass.radius = max(glass.radius, radius);
+                glass.radius2 = max(glass.radius2, mine.radius2_high);
+            }
         }
     }
     if (!finite(radiance.rgb) || isnan(radiance.w) || isinf(radiance.w)) {
@@ -53,5 +89,6 @@ void main() {
     if (has_surface && !has_photons) {
         radiance.w = uintBitsToFloat(0x7f800000u);
     }
+    glass_film[pixel.y * settings.resolution.x + pixel.x] = glass;
     film[pixel.y * settings.resolution.x + pixel.x] = radiance;
 }

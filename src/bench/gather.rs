@@ -10,10 +10,11 @@ use super::structure::{Structure, structure};
 use crate::backend::{Backend, DeviceDescription};
 use crate::config::{GROUP, Probe, RenderConfig};
 use crate::cpu::{self, Counts, Inputs};
+use crate::emission::Aim;
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, Tests, is_gather_stage};
 use crate::gpu::Device;
-use crate::layout::{Gathered, NO_OBJECT, Photon, Settings, Statistics, VisiblePoint};
+use crate::layout::{Gathered, NO_OBJECT, Photon, Settings, VisiblePoint};
 use crate::pipeline::Renderer;
 use crate::record::Run;
 use crate::scene::{Camera, PackedScene};
@@ -119,9 +120,10 @@ impl MethodResult {
 /// Visible points, photons and what each point accepts of them.
 struct Input {
     points: Vec<VisiblePoint>,
-    statistics: Vec<Statistics>,
+    /// R² of each slot, for each photon map.
+    radii2: Vec<f32>,
     photons: Vec<Photon>,
-    /// M of each slot, by a kd-tree on the CPU.
+    /// M of each slot, for each photon map, by a kd-tree on the CPU.
     expected: Vec<u32>,
 }
 
@@ -230,7 +232,8 @@ impl GatherBench<'_> {
 
     fn cpu_steps(&self, renderer: &mut Renderer, resolution: [u32; 2], steps: &mut StepTimes) -> Result<()> {
         let settings: Vec<Settings> = renderer.gpu().download(BufferId::Settings, Some(1))?;
-        let statistics: Vec<Statistics> = renderer.gpu().download(BufferId::StatisticsOf, None)?;
+        let statistics = renderer.gpu().download(BufferId::StatisticsOf, None)?;
+        let points: Vec<VisiblePoint> = renderer.gpu().download(BufferId::VisiblePoints, None)?;
         let direct = renderer.gpu().download(BufferId::DirectSums, None)?;
         let coverage = renderer.gpu().download(BufferId::CoverageOf, None)?;
         let config = RenderConfig {
@@ -241,6 +244,8 @@ impl GatherBench<'_> {
             scene: self.scene,
             settings: &settings[0],
             config: &config,
+            demand: None,
+            emission: renderer.aim().map(Aim::table),
         };
         let counts = Counts::default();
         let batch = cpu::Batch {
@@ -251,9 +256,10 @@ impl GatherBench<'_> {
         // One more, to warm up.
         let median_of = |work: &dyn Fn() -> f64| median((0..=self.repeats).map(|_| work()).skip(1).collect());
         steps.raytracing_us[1] = median_of(&|| timed_us(|| cpu::camera(&inputs, 0, &counts)).1);
-        steps.photon_tracing_us[1] = median_of(&|| timed_us(|| cpu::compact(&cpu::photons(&inputs, batch, &counts))).1);
+        steps.photon_tracing_us[1] =
+            median_of(&|| timed_us(|| cpu::compact(&cpu::photons(&inputs, batch, &counts).lanes)).1);
         steps.synthesize_us[1] =
-            median_of(&|| timed_us(|| cpu::resolve(&settings[0], &statistics, &direct, &coverage, 1, 1)).1);
+            median_of(&|| timed_us(|| cpu::resolve(&settings[0], &points, &statistics, &direct, &coverage, 1, 1)).1);
         Ok(())
     }
 }
@@ -262,12 +268,12 @@ fn input(renderer: &mut Renderer) -> Result<Input> {
     let count: Vec<u32> = renderer.gpu().download(BufferId::PhotonCount, Some(1))?;
     let mut input = Input {
         points: renderer.gpu().download(BufferId::VisiblePoints, None)?,
-        statistics: renderer.gpu().download(BufferId::StatisticsOf, None)?,
+        radii2: renderer.gpu().download(BufferId::Radii2, None)?,
         photons: renderer.gpu().download(BufferId::Photons, Some(count[0] as usize))?,
         expected: Vec::new(),
     };
-    let mut gathered = vec![Gathered::zeroed(); input.points.len()];
-    cpu::gather_kd_tree(&input.points, &input.statistics, &input.photons, &mut gathered)?;
+    let mut gathered = vec![Gathered::zeroed(); input.radii2.len()];
+    cpu::gather_kd_tree(&input.points, &input.radii2, &input.photons, &mut gathered)?;
     input.expected = gathered.iter().map(count_of).collect();
     Ok(input)
 }
@@ -365,14 +371,16 @@ impl Measured {
                 continue;
             }
             seen += 1;
-            let (found, expected) = (count_of(&gathered[slot]), input.expected[slot]);
-            accepted += f64::from(found);
-            if found != expected && !loses {
-                return Err(Error::Device(format!(
-                    "method {}: finds {found} photons for visible point {slot}, a kd-tree {expected}; please report this \
-                     with the device and its driver",
-                    METHODS[method].name
-                )));
+            for receiver in (slot..gathered.len()).step_by(input.points.len()) {
+                let (found, expected) = (count_of(&gathered[receiver]), input.expected[receiver]);
+                accepted += f64::from(found);
+                if found != expected && !loses {
+                    return Err(Error::Device(format!(
+                        "method {}: finds {found} photons for visible point {slot}, a kd-tree {expected}; please report \
+                         this with the device and its driver",
+                        METHODS[method].name
+                    )));
+                }
             }
         }
         measured.share = seen as f64 / visible_points.max(1) as f64;
@@ -392,9 +400,10 @@ impl Measured {
     /// Microseconds of testing every photon on the CPU for one visible point in `stride`.
     fn cpu_naive(&self, input: &Input, stride: usize) -> f64 {
         let points: Vec<VisiblePoint> = input.points.iter().copied().step_by(stride).collect();
-        let statistics: Vec<Statistics> = input.statistics.iter().copied().step_by(stride).collect();
-        let mut gathered = vec![Gathered::zeroed(); points.len()];
-        timed_us(|| cpu::gather_naive(&points, &statistics, &input.photons, &mut gathered)).1
+        let maps = input.radii2.chunks(input.points.len());
+        let radii2: Vec<f32> = maps.flat_map(|map| map.iter().copied().step_by(stride)).collect();
+        let mut gathered = vec![Gathered::zeroed(); radii2.len()];
+        timed_us(|| cpu::gather_naive(&points, &radii2, &input.photons, &mut gathered)).1
     }
 
     fn repeat(&mut self, renderer: &mut Renderer, input: &Input) -> Result<()> {
@@ -402,9 +411,9 @@ impl Measured {
             Runs::Device { .. } => phases(&renderer.gather(self.method, self.probe)?.0),
             Runs::CpuNaive => [0.0, 0.0, self.cpu_naive(input, self.probe.stride as usize)],
             Runs::CpuKdTree => {
-                let mut gathered = vec![Gathered::zeroed(); input.points.len()];
+                let mut gathered = vec![Gathered::zeroed(); input.radii2.len()];
                 let (found, us) =
-                    timed_us(|| cpu::gather_kd_tree(&input.points, &input.statistics, &input.photons, &mut gathered));
+                    timed_us(|| cpu::gather_kd_tree(&input.points, &input.radii2, &input.photons, &mut gathered));
                 found?;
                 [0.0, 0.0, us]
             }

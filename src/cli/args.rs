@@ -9,7 +9,7 @@ use super::bench::{BenchFeatures, BenchGather, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
 use super::scene::SceneArguments;
-use crate::config::{Accel, Direct, Estimator, Sampler, TriangleTest};
+use crate::config::{Accel, Direct, EmissionChoice, Estimator, Sampler, TriangleTest};
 use crate::gather;
 
 /// Progressive photon mapping on Vulkan: a glTF scene in, an OpenEXR picture out.
@@ -146,6 +146,10 @@ pub struct RenderArguments {
     /// Bounces of a camera or photon path at the most.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_depth: u32,
+    /// Where photon paths start: learned from what the picture needs, or by the lights' power as in the paper
+    /// [default: aimed, with --estimator ppm power].
+    #[arg(long, value_enum)]
+    pub emission: Option<EmissionChoice>,
     /// Where the numbers of paths come from [default: sobol, with --estimator ppm independent].
     #[arg(long, value_enum)]
     pub sampler: Option<Sampler>,

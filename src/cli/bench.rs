@@ -11,7 +11,7 @@ use super::args::{Arguments, gather_method, png_file, positive, resolution};
 use super::outputs::check_outputs;
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
-use crate::config::{Probe, RenderConfig};
+use crate::config::{EmissionChoice, Probe, RenderConfig};
 use crate::film::{write_png, write_whole};
 use crate::gather::{METHODS, method};
 use crate::scene::{PackedScene, Scene};
@@ -85,6 +85,8 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
             photons: arguments.photons,
             radius: arguments.radius,
             cell_photons: arguments.cell_photons,
+            // The paper's photons.
+            emission: EmissionChoice::Power,
             ..RenderConfig::default()
         },
         resolutions: resolutions(arguments),

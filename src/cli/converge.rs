@@ -11,7 +11,7 @@ use super::outputs::check_outputs;
 use super::scene::SceneArguments;
 use super::{Outcome, interrupt, print};
 use crate::bench::{Converge, Curve, converge, converge_table, csv, plot_convergence};
-use crate::config::{Direct, Estimator, RenderConfig, Sampler};
+use crate::config::{Direct, EmissionChoice, Estimator, RenderConfig, Sampler};
 use crate::film::{read_exr, write_whole};
 use crate::gather::METHODS;
 use crate::scene::PackedScene;
@@ -85,6 +85,7 @@ fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfi
             with("paper", &|config| {
                 config.estimator = Estimator::Ppm;
                 config.sampler = Sampler::of(Estimator::Ppm);
+                config.emission = EmissionChoice::of(Estimator::Ppm);
                 config.direct = Direct::Photons;
             }),
         ],
@@ -113,6 +114,7 @@ fn settings(base: &RenderConfig, vary: Option<Vary>) -> Vec<(String, RenderConfi
             with("ppm", &|config| {
                 config.estimator = Estimator::Ppm;
                 config.sampler = Sampler::of(Estimator::Ppm);
+                config.emission = EmissionChoice::of(Estimator::Ppm);
             }),
         ],
         Some(Vary::Sampler) => vec![

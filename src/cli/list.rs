@@ -95,6 +95,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
             "device_memory": memory.map(|(memory, config)| json!({
                 "scene_bytes": memory.scene,
                 "render_bytes": memory.render,
+                "caustic_map_bytes": memory.caustic_map,
                 "resolution": config.resolution,
                 "photons": config.photons,
             })),
@@ -154,9 +155,16 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     if let Some((memory, config)) = memory {
         let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
         let ([width, height], photons) = (config.resolution, config.photons);
+        let caustic_map = if memory.caustic_map > 0 {
+            let a_pixel = memory.caustic_map / (u64::from(width) * u64::from(height));
+            format!(", {a_pixel} bytes a pixel of it for a map of caustic photons")
+        } else {
+            String::new()
+        };
         writeln!(
             text,
-            "memory       {:.1} MiB of the device for the scene, {:.1} MiB for {width}x{height} and {photons} photon paths",
+            "memory       {:.1} MiB of the device for the scene, {:.1} MiB for {width}x{height} and {photons} photon \
+             paths{caustic_map}",
             mebibytes(memory.scene),
             mebibytes(memory.render)
         )?;

@@ -13,7 +13,7 @@ use super::outputs::check_outputs;
 use super::progress::{BUILDING, Limits, Progress, while_showing, with_prefix};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
-use crate::config::{Estimator, RenderConfig, Sampler};
+use crate::config::{EmissionChoice, Estimator, RenderConfig, Sampler};
 use crate::estimate::{ErrorEstimate, of_one_photon};
 use crate::film::{self, Metadata};
 use crate::gather::{self, METHODS, Runs};
@@ -65,6 +65,9 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
             "initial radius {:.6} scene units (automatic)",
             f64::from(backend.radius()) / packed.scale
         );
+    }
+    if config.emission == EmissionChoice::Aimed && !backend.aims() {
+        say!("photon paths start in proportion to the lights' power: aiming them isn't worth its cost in this scene");
     }
 
     let start = Instant::now();
@@ -123,21 +126,22 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         say!("warning: {warning}");
     }
     say!(
-        "{}: {}x{}, {} iterations, {} photon paths, {seconds:.1} s ({} photon paths/s) on {}{}",
+        "{}: {}x{}, {} iterations, {} photon paths ({}), {seconds:.1} s ({} photon paths/s) on {}{}",
         output.display(),
         image.width(),
         image.height(),
         backend.iterations(),
         backend.emitted(),
+        backend.counters().photons(),
         with_prefix(backend.emitted() as f64 / seconds),
         backend.device().name,
         estimated.map_or(String::new(), |error| format!("; {error}")),
     );
-    if resolved.without_photons() > 0 {
+    if let Some(error) = estimated.filter(|error| error.waiting > 0.0) {
         say!(
             "{:.2} % of the pixels have had no photon yet: of indirect light there the error says only what one photon would \
              bring",
-            100.0 * resolved.without_photons() as f64 / image.pixels().len() as f64
+            100.0 * error.waiting
         );
     }
     let subject = Subject {
@@ -173,6 +177,8 @@ fn choose_backend(arguments: &RenderArguments) -> (BackendChoice, usize) {
         Some("--cell-photons is of --gather cluster-grid")
     } else if arguments.aperture.is_some() && arguments.estimator == Estimator::Ppm {
         Some("--estimator ppm finds visible points once: it has no --aperture")
+    } else if arguments.emission == Some(EmissionChoice::Aimed) && arguments.estimator == Estimator::Ppm {
+        Some("--estimator ppm keeps all photons: its paths start by --emission power")
     } else if backend == BackendChoice::Cpu && arguments.device.is_some() {
         Some("the CPU backend has no --device")
     } else {
@@ -213,6 +219,9 @@ fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> Render
         accel: arguments.accel,
         triangle_test: arguments.triangle_test,
         max_depth: arguments.max_depth,
+        drop_unwanted: true,
+        aims_anyway: false,
+        emission: arguments.emission.unwrap_or(EmissionChoice::of(arguments.estimator)),
         sampler: arguments.sampler.unwrap_or(Sampler::of(arguments.estimator)),
         seed: arguments.seed,
     }

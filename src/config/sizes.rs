@@ -1,8 +1,9 @@
 //! Every buffer size and group count, and the numbers that they follow from.
 
-use super::{Estimator, RenderConfig};
+use super::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
-    Coverage, DirectSum, Gathered, Gloss, GridShape, Photon, RadiusSum, Statistics, StatusCounters, VisiblePoint,
+    BehindGlass, Coverage, DirectSum, EmissionCell, Gathered, Gloss, GridShape, Photon, SHELLS, ShellRadii, Statistics,
+    StatusCounters, VisiblePoint,
 };
 use crate::stage::BufferId;
 
@@ -10,6 +11,10 @@ use crate::stage::BufferId;
 pub const TILE: u32 = 8;
 /// Visible points of a pixel at the most, where they are found once: glass splits the path while a slot is free.
 pub const PPM_SLOTS: u32 = 8;
+/// Spheres that photon paths are aimed at, at the most.
+pub const MOST_TARGETS: u32 = 32;
+/// Cells of the table that aims them, at the most.
+pub const MOST_EMISSION_CELLS: u32 = 4096;
 /// Photons that one launch of a gather that tests every photon looks at, below every known driver's loop limit.
 pub const EXHAUSTIVE_RANGE: u32 = 16_000;
 /// Visible points of a workgroup of the paper's orders: the workgroup size of `gather_*.comp`, `RUN` of `clusters.glsl`.
@@ -22,16 +27,20 @@ pub const CURVE_BITS: u32 = 18;
 pub const LLOYD_ROUNDS: u32 = 4;
 /// Visible points that an invocation of `gather_clustered.comp` has.
 pub const CLUSTERED_RUN: u32 = 8;
-/// Workgroups that sum up the radii.
-pub const RADIUS_GROUPS: u32 = 256;
-/// The radius of every how many slots they look at: odd, so that it meets each of a pixel's slots.
-pub const RADIUS_STEP: u32 = 7;
+/// log2 of the entries of the table of what visible points want.
+pub const DEMAND_BITS: u32 = 18;
+/// Radii that the mean of a grid's radii is taken of, about: their sum has to fit a u32.
+const RADIUS_SAMPLES: u32 = 1 << 16;
 /// Numbers of a block of the prefix sum.
 pub const SCAN_BLOCK: u32 = 2048;
 /// Keys of a tile of the radix sort.
 pub const SORT_TILE: u32 = 2048;
 /// Bits of a digit of the radix sort.
 pub const SORT_DIGIT_BITS: u32 = 5;
+
+/// The head, the spheres, the cells.
+const EMISSION_TABLE_BYTES: usize =
+    16 * (1 + MOST_TARGETS as usize) + MOST_EMISSION_CELLS as usize * size_of::<EmissionCell>();
 
 /// Sizes of a render's buffers, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,10 +67,14 @@ pub struct Sizes {
     pub meshes: u32,
     /// Cells of all objects' grids.
     pub object_cells: u32,
+    /// 2 where caustic photons are gathered apart from the others, else 1.
+    pub photon_maps: u32,
     /// Whether the scene has glossy surfaces.
     pub glossy: bool,
     /// Photons of such a cell at the most.
     pub cell_photons: Option<u32>,
+    /// Whether photon paths are aimed.
+    pub aimed: bool,
     /// What a bench asks of the gathers.
     pub probe: Probe,
 }
@@ -95,6 +108,8 @@ pub struct Limits {
     pub lanes: u32,
     /// Whether the scene has surfaces at which a path splits in two.
     pub splitting: bool,
+    /// Whether it has mirrors or glass.
+    pub specular: bool,
     /// Whether it has glossy surfaces.
     pub glossy: bool,
     /// The scene's objects.
@@ -138,7 +153,14 @@ impl Sizes {
             cell_bits: (batch_paths.ilog2() + 3).clamp(12, 24),
             meshes: limits.meshes,
             object_cells: limits.object_cells,
+            // The paper has one photon map.
+            photon_maps: if limits.specular && config.estimator == Estimator::Sppm {
+                2
+            } else {
+                1
+            },
             glossy: limits.glossy,
+            aimed: config.emission == EmissionChoice::Aimed,
             cell_photons: config.cell_photons,
             probe: Probe::default(),
         };
@@ -196,6 +218,7 @@ impl Sizes {
     pub fn bytes(&self, id: BufferId) -> Option<u64> {
         let pixels = u64::from(self.resolution[0]) * u64::from(self.resolution[1]);
         let slots = u64::from(self.slots());
+        let receivers = u64::from(self.receivers());
         let photons = u64::from(self.photon_capacity);
         let lanes = u64::from(self.photon_lanes);
         let tiles = photons.max(slots).div_ceil(u64::from(SORT_TILE));
@@ -208,13 +231,21 @@ impl Sizes {
         let (count, size) = match id {
             BufferId::VisiblePoints => (slots, size_of::<VisiblePoint>()),
             BufferId::GlossOf => (if self.glossy { slots } else { 1 }, size_of::<Gloss>()),
-            BufferId::StatisticsOf => (slots, size_of::<Statistics>()),
-            BufferId::GatheredOf => (slots, size_of::<Gathered>()),
+            BufferId::EmissionTable if self.aimed => (1, EMISSION_TABLE_BYTES),
+            BufferId::EmissionTable => (1, 16),
+            BufferId::PathValues => (if self.aimed { u64::from(self.batch_paths) } else { 1 }, 4),
+            BufferId::StatisticsOf => (receivers, size_of::<Statistics>()),
+            BufferId::GatheredOf => (receivers, size_of::<Gathered>()),
             BufferId::DirectSums => (slots, size_of::<DirectSum>()),
-            BufferId::CoverageOf => (slots, size_of::<Coverage>()),
-            BufferId::TestsOf => (if self.probe.count_tests { slots } else { 1 }, 4),
-            BufferId::RadiusSums => (u64::from(RADIUS_GROUPS), size_of::<RadiusSum>()),
+            BufferId::CoverageOf => (receivers, size_of::<Coverage>()),
+            BufferId::TestsOf => (if self.probe.count_tests { receivers } else { 1 }, 4),
+            BufferId::Footprints => (slots, 4),
+            BufferId::Demand => (1 << DEMAND_BITS, 4),
+            // Whole texels of four.
+            BufferId::Radii2 => (receivers, 4),
+            BufferId::RadiiOfShells => (2 * SHELLS as u64, size_of::<ShellRadii>()),
             BufferId::Film => (pixels, 16),
+            BufferId::GlassFilm => (pixels, size_of::<BehindGlass>()),
             BufferId::Status => (1, size_of::<StatusCounters>()),
             BufferId::Grid => (1, size_of::<GridShape>()),
             BufferId::PhotonCount | BufferId::PointCount | BufferId::ScanTotal => (1, 4),
@@ -256,9 +287,24 @@ impl Sizes {
         self.pixel_slots * self.slots_per_pixel
     }
 
+    /// What gathers photons: each slot for each photon map.
+    pub fn receivers(&self) -> u32 {
+        self.slots() * self.photon_maps
+    }
+
+    /// Every how many receivers' radii the mean of a grid's radii is taken of: odd, so that it meets each of a pixel's slots.
+    pub fn radius_step(&self) -> u32 {
+        (self.receivers() / RADIUS_SAMPLES) | 1
+    }
+
     /// Photons that the lanes can store.
     pub fn lane_photons(&self) -> u32 {
         self.photon_lanes.saturating_mul(self.lane_capacity)
+    }
+
+    /// Photon paths of a round that only tells where they should start, for iterations of `paths`.
+    pub fn pilot_paths(&self, paths: u32) -> u32 {
+        paths.div_ceil(4).min(self.batch_paths)
     }
 
     /// Batches of an iteration of `paths` photon paths.
@@ -288,6 +334,7 @@ mod tests {
                 loop_limit: u32::MAX,
                 lanes,
                 splitting: false,
+                specular: false,
                 glossy: false,
                 meshes: 5,
                 object_cells: 500,

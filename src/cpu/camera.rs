@@ -11,10 +11,9 @@ use super::contact::{Encounter, choose_part, is_mixed, transmittance};
 use super::dispersion::disperse;
 use super::environment::Environment;
 use super::glint::glint;
-use super::gloss::{FOLLOWED_ALPHA, Reflector};
+use super::gloss::Reflector;
 use super::intersect::{PlacedTriangle, Ray};
 use super::light::{emits, emitted_radiance};
-use super::random::{PathKind, Random};
 use super::sampling::{disc_point, encode_direction};
 use super::surface::{Facing, GLOSSY, MATTE, MIRROR, Surface};
 use super::texture::nearest_visible;
@@ -22,7 +21,8 @@ use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{BACK_HIDDEN, Gloss, NO_OBJECT, VisiblePoint};
+use crate::layout::{BACK_HIDDEN, FOLLOWED_ALPHA, Gloss, NO_OBJECT, VisiblePoint};
+use crate::random::{PathKind, Random};
 
 /// What is left of a path that splits.
 #[derive(Clone, Copy)]
@@ -30,6 +30,8 @@ struct Branch {
     ray: Ray,
     throughput: DVec3,
     emitted: DVec3,
+    /// From the camera so far.
+    way: f64,
     depth: u32,
     ignored: Option<PlacedTriangle>,
     /// Material that it is in.
@@ -75,9 +77,11 @@ pub struct Seen {
     pub points: Vec<VisiblePoint>,
     /// How those scatter; empty where the scene has no glossy surfaces.
     pub gloss: Vec<Gloss>,
+    /// Side of the pixel where each visible point is, render units.
+    pub footprints: Vec<f32>,
 }
 
-/// The same, borrowed.
+/// What gathers read of it, borrowed.
 #[derive(Debug, Clone, Copy)]
 pub struct SeenSlice<'a> {
     pub(super) points: &'a [VisiblePoint],
@@ -85,7 +89,7 @@ pub struct SeenSlice<'a> {
 }
 
 impl<'a> From<&'a Seen> for SeenSlice<'a> {
-    fn from(Seen { points, gloss }: &'a Seen) -> Self {
+    fn from(Seen { points, gloss, .. }: &'a Seen) -> Self {
         Self { points, gloss }
     }
 }
@@ -112,7 +116,12 @@ impl SeenSlice<'_> {
 }
 
 /// A slot in the making.
-type Slot = (VisiblePoint, Gloss);
+#[derive(Clone, Copy)]
+struct Slot {
+    point: VisiblePoint,
+    gloss: Gloss,
+    footprint: f32,
+}
 
 /// The visible points of an iteration.
 pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Seen {
@@ -126,11 +135,12 @@ pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Seen {
                 follow(inputs, pixel, iteration, slots, counts);
             }
         });
-    let (points, mut gloss): (Vec<_>, Vec<_>) = slots.into_iter().unzip();
-    if !inputs.scene.features.glossy {
-        gloss = Vec::new();
+    let glossy = inputs.scene.features.glossy;
+    Seen {
+        points: slots.iter().map(|slot| slot.point).collect(),
+        gloss: slots.iter().filter(|_| glossy).map(|slot| slot.gloss).collect(),
+        footprints: slots.iter().map(|slot| slot.footprint).collect(),
     }
-    Seen { points, gloss }
 }
 
 /// A visible point whose path met no matte surface.
@@ -140,7 +150,11 @@ fn nothing_seen(emitted: DVec3) -> Slot {
         weight_normal: [0.0; 4],
         emitted_normal: with_word(emitted, 0),
     };
-    (point, Gloss::zeroed())
+    Slot {
+        point,
+        gloss: Gloss::zeroed(),
+        footprint: 0.0,
+    }
 }
 
 /// The visible point of a path that ends on a surface.
@@ -156,13 +170,17 @@ fn seen(inputs: &Inputs<'_>, branch: &Branch, surface: &Surface, facing: &Facing
         weight_normal: with_word(branch.throughput * brdf, encode_direction(facing.geometric_normal)),
         emitted_normal: with_word(branch.emitted, encode_direction(facing.shading_normal)),
     };
-    (point, reflector.to_gloss(-branch.ray.direction))
+    Slot {
+        point,
+        gloss: reflector.to_gloss(-branch.ray.direction),
+        footprint: 0.0,
+    }
 }
 
 fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slot], counts: &Counts) {
     let settings = inputs.settings;
     let [width, _] = settings.resolution;
-    let mut random = Random::of_pixel(inputs, PathKind::Camera, pixel[1] * width + pixel[0], iteration);
+    let mut random = Random::of_pixel(inputs.config, PathKind::Camera, pixel[1] * width + pixel[0], iteration);
     let [jitter_x, jitter_y, ..] = random.next4();
     let [x, y] = match inputs.config.estimator {
         Estimator::Sppm => [jitter_x, jitter_y],
@@ -193,6 +211,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
         },
         throughput: DVec3::ONE,
         emitted: DVec3::ZERO,
+        way: 0.0,
         depth: 0,
         ignored: None,
         medium: None,
@@ -202,7 +221,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
     }];
     let mut used = 0;
     while let Some(mut branch) = pending.pop() {
-        slots[used] = loop {
+        let slot = loop {
             let Some(hit) = nearest_visible(inputs, branch.ray, FAR, branch.ignored, &random) else {
                 if !branch.emission_seen {
                     let sky = Environment::of(&inputs.scene.environment).at(branch.ray.direction);
@@ -213,6 +232,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
             let incoming = branch.ray.direction;
             let met = Encounter::new(inputs, hit, incoming, branch.medium);
             let (surface, mut facing) = (met.surface, met.facing);
+            branch.way += hit.t;
             if branch.depth == 0 && !facing.front && surface.material.flags & BACK_HIDDEN != 0 {
                 // What lies behind isn't there by the same chance again.
                 random.next4();
@@ -360,6 +380,11 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slo
                 break nothing_seen(branch.emitted);
             }
             branch.ray.origin = surface.origin_towards(branch.ray.direction);
+        };
+        let way = if parallel == 0.0 { branch.way } else { 1.0 };
+        slots[used] = Slot {
+            footprint: (f64::from(settings.pixel_spread) * way) as f32,
+            ..slot
         };
         used += 1;
     }

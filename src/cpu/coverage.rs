@@ -4,43 +4,68 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::intersect::{Ray, nearest_hit};
-use super::random::{PathKind, Random};
-use super::sampling::{basis, decode_direction, disc_point};
-use super::surface::{DIELECTRIC, Surface, offset_origin, reach_of, surface_of};
+use super::sampling::{basis, cosine_direction, decode_direction, disc_point};
+use super::surface::{DIELECTRIC, MATTE, Surface, offset_origin, reach_of, surface_of};
 use super::texture::share_there;
 use super::vector::{word, xyz};
 use super::{FAR, Inputs};
-use crate::layout::{Coverage, NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint};
+use crate::layout::{Coverage, Gathered, NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint};
+use crate::random::{PathKind, Random};
 
 /// What an iteration counts for, whatever its points.
 const WHOLE: u32 = 16;
+/// A disc that has been covered in so many iterations, and wholly, is asked for in every eighth one alone, as
+/// its neighbours are: discs only shrink.
+const TRUSTED: u32 = 4;
 /// Surfaces that are crossed on the way at the most.
 const MOST_CROSSINGS: u32 = 4;
 
-/// Asks points of the disc of radius R around each visible point: past the edge of the object, or inside an opaque one that
-/// stands on it, there are no photons.
+/// Asks points of the disc of radius R around each visible point, for each photon map: past the edge of the object, or inside
+/// an opaque one that stands on it, there are no photons. As long as a point has had no photon, a ray into its hemisphere says
+/// whether it lies in the open, where none has to come.
 pub fn coverage(
     inputs: &Inputs<'_>,
     iteration: u32,
     visible_points: &[VisiblePoint],
-    statistics: &[Statistics],
+    radii2: &[f32],
+    (statistics, gathered): (&[Statistics], &[Gathered]),
     coverage: &mut [Coverage],
 ) {
     let points = inputs.config.coverage_points(iteration);
-    let slots = coverage.par_iter_mut().zip(visible_points).zip(statistics).enumerate();
-    slots.for_each(|(slot, ((coverage, point), statistics))| {
-        if word(point.position_object) == NO_OBJECT {
-            return;
-        }
-        let random = Random::of_pixel(inputs, PathKind::Coverage, slot as u32, iteration);
-        let radius = f64::from(statistics.radius2_high).sqrt();
-        let covered = (0..points).filter(|&number| {
-            let [u, v, ..] = random.sample_of(number, points).next4();
-            can_have_photons(inputs, point, radius, u, v)
+    let has_caustic_photons = |slot: usize| {
+        let caustic = statistics.get(visible_points.len() + slot);
+        caustic.is_some_and(|statistics| (statistics.accepted_low | statistics.accepted_high) != 0)
+    };
+    let receivers = coverage.par_iter_mut().zip(radii2).zip(statistics).zip(gathered);
+    receivers
+        .enumerate()
+        .for_each(|(index, (((coverage, &radius2), statistics), gathered))| {
+            let slot = index % visible_points.len();
+            let point = &visible_points[slot];
+            if word(point.position_object) == NO_OBJECT {
+                return;
+            }
+            // Without photons there is nothing to correct.
+            let photons = statistics.accepted_low | statistics.accepted_high | word(gathered.flux_count);
+            let trusted = coverage.covered == coverage.asked && coverage.asked >= TRUSTED * WHOLE;
+            let random = Random::of_pixel(inputs.config, PathKind::Coverage, slot as u32, iteration);
+            if photons == 0 && index < visible_points.len() && coverage.surrounded == 0 && !has_caustic_photons(slot) {
+                let mut behind = random;
+                behind.skip_to(WHOLE); // those of the disc
+                let [u, v, ..] = behind.next4();
+                coverage.surrounded = u32::from(is_surrounded(inputs, point, u, v));
+            }
+            if photons == 0 || (trusted && !(iteration as usize + slot / 64).is_multiple_of(8)) {
+                return;
+            }
+            let radius = f64::from(radius2).sqrt();
+            let covered = (0..points).filter(|&number| {
+                let [u, v, ..] = random.sample_of(number, points).next4();
+                can_have_photons(inputs, point, radius, u, v)
+            });
+            coverage.covered += covered.count() as u32 * (WHOLE / points);
+            coverage.asked += WHOLE;
         });
-        coverage.covered += covered.count() as u32 * (WHOLE / points);
-        coverage.asked += WHOLE;
-    });
 }
 
 /// The side of an object that a ray meets.
@@ -118,4 +143,29 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
         let there = surface_of(inputs.scene, hit);
         there.object == object && share_there(inputs.scene, &there) > 0.0
     })
+}
+
+/// Whether a ray meets something, past glass, that may scatter light or mirror it.
+fn is_surrounded(inputs: &Inputs<'_>, point: &VisiblePoint, u: f64, v: f64) -> bool {
+    let n = decode_direction(word(point.weight_normal));
+    let direction = cosine_direction(n, u, v);
+    let mut origin = offset_origin(
+        xyz(point.position_object),
+        n,
+        reach_of(inputs.scene, word(point.position_object)),
+    );
+    let mut ignored = None;
+    for _ in 0..=MOST_CROSSINGS {
+        let Some(hit) = nearest_hit(inputs, Ray { origin, direction }, FAR, ignored) else {
+            return false;
+        };
+        let surface = surface_of(inputs.scene, hit);
+        let passes = surface.material.surface == DIELECTRIC || surface.flags & SEE_THROUGH != 0;
+        if !passes {
+            return surface.material.surface != MATTE || surface.material.base_color[..3] != [0.0; 3];
+        }
+        origin = surface.origin_towards(direction);
+        ignored = Some(hit.at);
+    }
+    false
 }

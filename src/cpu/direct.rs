@@ -1,5 +1,5 @@
 //! What each visible point's path sees of the lights: by itself and, unless photons carry direct light too, by one
-//! ray towards a light.
+//! ray towards a light. Where glass alone stands between, photons have to bring that light: what it would be unbent is kept.
 
 use std::f64::consts::PI;
 
@@ -9,41 +9,60 @@ use rayon::prelude::*;
 use super::camera::SeenSlice;
 use super::environment::{Environment, Sky};
 use super::gloss::Reflector;
-use super::intersect::{PlacedTriangle, Ray};
+use super::intersect::{Hit, PlacedTriangle, Ray};
 use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
-use super::random::{PathKind, Random};
+use super::resolve::photons_of;
 use super::sampling::{cosine_direction, decode_direction, triangle_point};
-use super::surface::{offset_origin, reach_of, surface_at, surface_of};
+use super::surface::{DIELECTRIC, offset_origin, reach_of, surface_at, surface_of};
 use super::texture::{apply_textures, nearest_visible, share_there};
-use super::vector::{from_two_floats, to_two_floats, word, xyz};
+use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
-use crate::layout::{DirectSum, ENVIRONMENT_LIGHT, NO_LIGHT, NO_OBJECT, VisiblePoint};
+use crate::layout::{DirectSum, ENVIRONMENT_LIGHT, NO_LIGHT, NO_OBJECT, Statistics, VisiblePoint};
+use crate::random::{PathKind, Random};
 
 /// Adds an iteration's radiance to the sum of each slot.
 pub fn direct<'a>(
     inputs: &Inputs<'_>,
     iteration: u32,
     seen: impl Into<SeenSlice<'a>>,
+    statistics: &[Statistics],
     counts: &Counts,
     direct_sums: &mut [DirectSum],
 ) {
     let seen = seen.into();
-    let slots = direct_sums.par_iter_mut().zip(seen.points).enumerate();
-    slots.for_each(|(slot, (sum, point))| {
+    // The photons that may have brought light behind glass.
+    let of_last_map = &statistics[statistics.len() - seen.points.len()..];
+    let slots = direct_sums.par_iter_mut().zip(seen.points).zip(of_last_map).enumerate();
+    slots.for_each(|(slot, ((sum, point), statistics))| {
         let mut radiance = xyz(point.emitted_normal);
+        let mut unbent = 0.0;
+        let mut asks = false;
         if inputs.config.direct == Direct::Light && word(point.position_object) != NO_OBJECT {
-            let mut random = Random::of_pixel(inputs, PathKind::LightSample, slot as u32, iteration);
+            let mut random = Random::of_pixel(inputs.config, PathKind::LightSample, slot as u32, iteration);
             let sample = random.next4();
             let digits = if inputs.scene.lights.len() > 1 {
                 random.next4()
             } else {
                 [0.0; 4]
             };
-            radiance += sample_direct(inputs, point, seen.reflector(slot), sample, digits, &random);
+            asks = inputs.scene.features.dielectric
+                && inputs.config.asks_behind_glass(iteration)
+                && (iteration.is_multiple_of(ASKS_EVERY) || photons_of(statistics) < SEASONED);
+            let (sampled, behind_glass) =
+                sample_direct(inputs, point, seen.reflector(slot), sample, digits, asks, &random);
+            if behind_glass {
+                let mean = sampled.element_sum() / 3.0;
+                unbent = if mean.is_finite() { mean } else { 0.0 };
+            } else {
+                radiance += sampled;
+            }
         }
         if radiance.is_finite() {
+            let (unbent_before, asked_before) = (sum.high[3], sum.low[3]);
             (sum.high, sum.low) = to_two_floats(from_two_floats(sum.high, sum.low) + radiance.extend(0.0));
+            sum.high[3] = unbent_before + unbent as f32;
+            sum.low[3] = asked_before + f32::from(asks);
         } else {
             counts.add_non_finite(1);
         }
@@ -52,17 +71,68 @@ pub fn direct<'a>(
 
 /// A shadow ray ends this part of its length before the light, as it does on a device.
 const ENDS_BEFORE: f64 = 16.0 / 16_777_216.0;
+/// Glass surfaces that are crossed on the way to a light at the most.
+const MOST_CROSSINGS: u32 = 8;
+/// Photons from which on a point asks for what lies behind glass in the first of [`ASKS_EVERY`] iterations alone.
+const SEASONED: u32 = 16;
+const ASKS_EVERY: u32 = 32;
+
+/// What a ray meets beyond glass.
+struct Beyond {
+    hit: Option<Hit>,
+    /// The glass's colours, where there is any.
+    tint: Option<DVec3>,
+}
+
+impl Beyond {
+    /// What light from there adds, and whether glass stands before it.
+    fn of(&self, light: DVec3) -> (DVec3, bool) {
+        (light * self.tint.unwrap_or(DVec3::ONE), self.tint.is_some())
+    }
+}
+
+/// Follows a ray through glass as if that didn't bend it; where `lights_end_it`, to the first surface of a light. Unless it `asks`,
+/// it ends on glass.
+fn look(
+    inputs: &Inputs<'_>,
+    ray: Ray,
+    end: f64,
+    ignored: Option<PlacedTriangle>,
+    asks: bool,
+    lights_end_it: bool,
+    random: &Random,
+) -> Beyond {
+    let (mut from, mut tint, mut crossings) = (ray, None, 0);
+    loop {
+        let passed = (from.origin - ray.origin).dot(ray.direction) / ray.direction.length_squared();
+        let hit = nearest_visible(inputs, from, end - passed, ignored, random);
+        let met = hit.map(|hit| surface_of(inputs.scene, hit)).filter(|met| {
+            asks && crossings < MOST_CROSSINGS
+                && met.material.surface == DIELECTRIC
+                && !(lights_end_it && met.light != NO_LIGHT)
+        });
+        let Some(met) = met else {
+            return Beyond { hit, tint };
+        };
+        tint = Some(tint.unwrap_or(DVec3::ONE) * rgb(met.material.base_color));
+        from.origin = met.origin_towards(ray.direction);
+        crossings += 1;
+    }
+}
 
 /// weight · BRDF · L · cos θ_surface over the density per solid angle of both ways to choose the ray: towards a light
-/// chosen in proportion to its flux, or along a direction of the BSDF, which never meets a light without extent.
+/// chosen in proportion to its flux, or along a direction of the BSDF, which never meets a light without extent. And whether
+/// glass stands before the light, so that this is what it would bring unbent.
 fn sample_direct(
     inputs: &Inputs<'_>,
     point: &VisiblePoint,
     gloss: Option<(Reflector, DVec3)>,
     [choice, u, v, way]: [f64; 4],
     [first_digits, _, second_digits, _]: [f64; 4],
+    asks: bool,
     random: &Random,
-) -> DVec3 {
+) -> (DVec3, bool) {
+    let nothing = (DVec3::ZERO, false);
     let position = xyz(point.position_object);
     let geometric_normal = decode_direction(word(point.weight_normal));
     let shading_normal = decode_direction(word(point.emitted_normal));
@@ -80,8 +150,10 @@ fn sample_direct(
         (_, q) => (q, 0.0),
     };
     let leaves = |ray: DVec3| ray.dot(geometric_normal) > 0.0 && ray.dot(shading_normal) > 0.0;
-    let is_free = |direction: DVec3, end: f64, ignored: Option<PlacedTriangle>| {
-        leaves(direction) && nearest_visible(inputs, Ray { origin, direction }, end, ignored, random).is_none()
+    // Where nothing but glass stands in the way, that.
+    let look_for = |direction: DVec3, end: f64, ignored: Option<PlacedTriangle>| {
+        let seen = || look(inputs, Ray { origin, direction }, end, ignored, asks, false, random);
+        leaves(direction).then(seen).filter(|seen| seen.hit.is_none())
     };
     // What a unit of irradiance across a direction adds.
     let response = |direction: DVec3| {
@@ -90,7 +162,7 @@ fn sample_direct(
         });
         xyz(point.weight_normal) * brdf * direction.dot(shading_normal)
     };
-    let seen = |Sky { radiance, density }: Sky, direction: DVec3| {
+    let response_to = |Sky { radiance, density }: Sky, direction: DVec3| {
         let mut of_bsdf = (1.0 - reflections) * direction.dot(shading_normal) / PI;
         if let Some((reflector, viewer)) = wide {
             of_bsdf += reflections * reflector.reflected_density(shading_normal, viewer, direction);
@@ -100,12 +172,12 @@ fn sample_direct(
     let sky = |sky: Sky, direction: DVec3| {
         let probability = inputs.scene.lights.last().map_or(0.0, |light| light.probability);
         let density = sky.density * f64::from(probability);
-        seen(Sky { density, ..sky }, direction)
+        response_to(Sky { density, ..sky }, direction)
     };
     let environment = Environment::of(&inputs.scene.environment);
 
     let by_bsdf = way < q;
-    let mut emitter = if by_bsdf {
+    let (mut emitter, seen_light) = if by_bsdf {
         let direction = match wide {
             Some((reflector, viewer)) if choice < reflections => {
                 reflector.reflected_direction(shading_normal, viewer, [u, v])
@@ -113,44 +185,36 @@ fn sample_direct(
             _ => cosine_direction(shading_normal, u, v),
         };
         if !leaves(direction) {
-            return DVec3::ZERO;
+            return nothing;
         }
-        let Some(hit) = nearest_visible(inputs, Ray { origin, direction }, FAR, None, random) else {
-            return sky(environment.at(direction), direction);
+        let seen = look(inputs, Ray { origin, direction }, FAR, None, asks, true, random);
+        let Some(hit) = seen.hit else {
+            return seen.of(sky(environment.at(direction), direction));
         };
-        surface_of(inputs.scene, hit)
+        (surface_of(inputs.scene, hit), seen)
     } else {
         let light = choose_light(&inputs.scene.lights, choice, [first_digits, second_digits]).light;
         if is_punctual(light) {
             let Arriving { ray, end, irradiance } = arriving_from(light, origin);
-            return if is_free(ray, end, None) {
-                response(ray.normalize()) * irradiance / (f64::from(light.probability) * (1.0 - q))
-            } else {
-                DVec3::ZERO
-            };
+            return look_for(ray, end, None).map_or(nothing, |seen| {
+                seen.of(response(ray.normalize()) * irradiance / (f64::from(light.probability) * (1.0 - q)))
+            });
         }
         if light.kind == ENVIRONMENT_LIGHT {
             let (direction, sampled) = environment.sample(u, v);
-            return if is_free(direction, FAR, None) {
-                sky(sampled, direction)
-            } else {
-                DVec3::ZERO
-            };
+            return look_for(direction, FAR, None).map_or(nothing, |seen| seen.of(sky(sampled, direction)));
         }
         let (u, v) = triangle_point(u, v);
         let emitter = surface_at(inputs.scene, PlacedTriangle::unplaced(light.triangle), u, v);
         let direction = emitter.origin_towards(position - emitter.position) - origin;
-        if !is_free(
-            direction,
-            1.0 - ENDS_BEFORE,
-            Some(PlacedTriangle::unplaced(light.triangle)),
-        ) {
-            return DVec3::ZERO;
-        }
-        emitter
+        let ignored = Some(PlacedTriangle::unplaced(light.triangle));
+        let Some(seen) = look_for(direction, 1.0 - ENDS_BEFORE, ignored) else {
+            return nothing;
+        };
+        (emitter, seen)
     };
     if emitter.light == NO_LIGHT {
-        return DVec3::ZERO;
+        return nothing;
     }
     apply_textures(inputs.scene, &mut emitter);
     // A ray that met the light had its chance to pass it.
@@ -164,9 +228,9 @@ fn sample_direct(
     let direction = to_light.normalize_or_zero();
     let cos_light = -direction.dot(emitter.geometric_normal);
     if !emits(&emitter.material, cos_light > 0.0) || direction.dot(shading_normal) <= 0.0 || cos_light == 0.0 {
-        return DVec3::ZERO;
+        return nothing;
     }
     let radiance = there * emitted_radiance(&emitter.material, cos_light.abs());
     let density = f64::from(light.probability) * to_light.length_squared() / (f64::from(light.area) * cos_light.abs());
-    seen(Sky { radiance, density }, direction)
+    seen_light.of(response_to(Sky { radiance, density }, direction))
 }

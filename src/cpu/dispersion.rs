@@ -2,8 +2,8 @@
 
 use glam::{DVec3, dvec3};
 
-use super::random::Random;
 use crate::layout::Material;
+use crate::random::Random;
 
 /// Wavelengths that paths have, nm.
 const SHORTEST: f64 = 400.0;

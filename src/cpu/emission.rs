@@ -7,13 +7,17 @@ use glam::{DVec2, DVec3};
 use super::Inputs;
 use super::environment::Environment;
 use super::intersect::{PlacedTriangle, Ray};
-use super::light::{Choice, choose_light, emits, emitted_radiance};
-use super::random::Random;
+use super::light::{Choice, choose_light, emits, emitted_radiance, spot_falloff};
 use super::sampling::{basis, cosine_direction, disc_point, triangle_point};
 use super::surface::{offset_origin, surface_at};
 use super::texture::{apply_textures, share_there};
-use super::vector::rgb;
+use super::vector::{rgb, xyz};
+use crate::emission::{Table, light_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
+use crate::random::Random;
+
+#[cfg(test)]
+mod tests;
 
 /// The start of a photon path.
 pub(super) struct Emission {
@@ -25,59 +29,245 @@ pub(super) struct Emission {
     pub inverse_range: f64,
 }
 
-/// Starts a path on a light.
+/// What paths are to pass through.
+#[derive(Debug, Clone, Copy)]
+struct Sphere {
+    centre: DVec3,
+    radius: f64,
+}
+
+impl Sphere {
+    fn of(sphere: [f32; 4]) -> Self {
+        Self {
+            centre: xyz(sphere),
+            radius: sphere[3].into(),
+        }
+    }
+
+    /// Whether a ray meets it. One that comes from afar has no beginning.
+    fn is_met(&self, ray: Ray, from_afar: bool) -> bool {
+        let to_centre = self.centre - ray.origin;
+        let along = to_centre.dot(ray.direction);
+        let along = if from_afar { along } else { along.max(0.0) };
+        (to_centre - along * ray.direction).length_squared() <= self.radius * self.radius
+    }
+
+    /// Axis of the cone in which it is seen, and 1 − cos of the angle between that and the cone's sides; 2 from inside.
+    fn cone(&self, from: DVec3) -> (DVec3, f64) {
+        let way = self.centre - from;
+        let sin2 = self.radius * self.radius / way.length_squared();
+        if sin2 < 1.0 {
+            (way.normalize(), sin2 / (1.0 + (1.0 - sin2).sqrt()))
+        } else {
+            (DVec3::Z, 2.0)
+        }
+    }
+}
+
+/// A start, and what is to be known of it to tell which targets it meets.
+struct Start {
+    ray: Ray,
+    flux: DVec3,
+    ignored: Option<PlacedTriangle>,
+    /// A point of the ray from afar, which has no beginning.
+    passed: Option<DVec3>,
+    /// By the way it was chosen.
+    on_target: bool,
+}
+
+/// Starts a path on a light: where the table says or, without one, by power. One without flux is rejected, since it would
+/// meet another target before the one that it was chosen for.
 pub(super) fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Emission {
-    let [choice, second, direction_u, direction_v] = random.next4();
-    let [digits, side, more_digits, _] = random.next4();
-    let Choice { light, rest } = choose_light(&inputs.scene.lights, choice, [digits, more_digits]);
-    let (place, direction) = (DVec2::new(rest, second), DVec2::new(direction_u, direction_v));
-    let (ray, flux, ignored) = match light.kind {
-        POINT_LIGHT => {
-            let ray = Ray {
-                origin: rgb(light.position),
-                direction: direction_off(DVec3::Z, 2.0 * direction.x, direction.y),
-            };
-            (ray, rgb(light.intensity) * 4.0 * PI, None)
+    let u = random.next4();
+    let w = random.next4();
+    if let Some(table) = inputs.emission {
+        return emit_aimed(inputs, table, u, w);
+    }
+    let Choice { light, rest } = choose_light(&inputs.scene.lights, u[0], [w[0], w[2]]);
+    let start = from_light(
+        inputs,
+        light,
+        DVec2::new(rest, u[1]),
+        DVec2::new(u[2], u[3]),
+        w[1],
+        None,
+    );
+    start.emission(light, 1.0 / f64::from(light.probability))
+}
+
+/// A sphere that is seen within less than this, sin² of its cone's angle, is worth aiming at from a matte surface.
+const NARROW_CONE: f64 = 0.25;
+
+/// From a matte surface outside of what the camera sees, half of the photons are aimed there. The direction in place of the
+/// `cosine`'s, and what the flux is to be weighed with: cosine over the density of both ways together, at most 2.
+pub(super) fn guide(inputs: &Inputs<'_>, position: DVec3, normal: DVec3, u: [f64; 4], cosine: DVec3) -> (DVec3, f64) {
+    let view = inputs
+        .emission
+        .and_then(|table| table.view.map(|view| Sphere::of(table.spheres[view as usize])));
+    let Some(view) = view else { return (cosine, 1.0) };
+    let way = view.centre - position;
+    if view.radius.powi(2) >= NARROW_CONE * way.length_squared() || way.dot(normal) <= -view.radius {
+        return (cosine, 1.0);
+    }
+    let (axis, versine) = view.cone(position);
+    let aimed = u[3] < 0.5;
+    let direction = if aimed {
+        direction_in_cone(axis, versine, DVec2::new(u[0], u[1]))
+    } else {
+        cosine
+    };
+    let inside = aimed || 1.0 - direction.dot(axis) <= versine;
+    let by_cosine = direction.dot(normal).max(0.0) / PI;
+    let by_aim = if inside { 1.0 / (2.0 * PI * versine) } else { 0.0 };
+    let weight = if by_cosine > 0.0 {
+        2.0 * by_cosine / (by_cosine + by_aim)
+    } else {
+        0.0
+    };
+    (direction, weight)
+}
+
+fn emit_aimed(inputs: &Inputs<'_>, table: &Table, u: [f64; 4], w: [f64; 4]) -> Emission {
+    let chosen = table.choose(u, w);
+    let [x, y, direction_x, direction_y, number] = table.coordinates(chosen);
+    let cell = &table.cells[chosen.cell];
+    let (light, probability) = light_of(&inputs.scene.lights, cell, number);
+    let light = &inputs.scene.lights[light];
+    let index = (cell.target as usize).min(table.spheres.len());
+    let target = table.spheres.get(index).copied().map(Sphere::of);
+    let (place, direction) = (DVec2::new(x, y), DVec2::new(direction_x, direction_y));
+    let start = from_light(inputs, light, place, direction, w[1], target);
+    let is_met = |sphere: &Sphere| match start.passed {
+        Some(origin) => sphere.is_met(Ray { origin, ..start.ray }, true),
+        None => sphere.is_met(start.ray, false),
+    };
+    let met = start.on_target || target.is_none_or(|target| is_met(&target));
+    let kept = met
+        && !table.spheres[..index]
+            .iter()
+            .any(|&earlier| is_met(&Sphere::of(earlier)));
+    let weight = if kept {
+        f64::from(cell.weight) / probability
+    } else {
+        0.0
+    };
+    start.emission(light, weight)
+}
+
+impl Start {
+    fn emission(&self, light: &Light, weight: f64) -> Emission {
+        Emission {
+            ray: self.ray,
+            flux: self.flux * weight,
+            ignored: self.ignored,
+            inverse_range: light.inverse_range.into(),
         }
-        SPOT_LIGHT => {
-            let (versine, solid_angle) = spot_versine(light, direction.x);
-            let ray = Ray {
-                origin: rgb(light.position),
-                direction: direction_off(rgb(light.direction), versine, direction.y),
-            };
-            (ray, rgb(light.intensity) * solid_angle, None)
-        }
+    }
+}
+
+/// From a light towards a target, or wherever it shines; flux over the density of the coordinates' choice.
+fn from_light(
+    inputs: &Inputs<'_>,
+    light: &Light,
+    place: DVec2,
+    direction: DVec2,
+    side: f64,
+    target: Option<Sphere>,
+) -> Start {
+    match light.kind {
+        POINT_LIGHT | SPOT_LIGHT => from_point(light, direction, target),
         DIRECTIONAL_LIGHT => {
-            let ray = from_afar(rgb(light.position), rgb(light.direction), light, place);
-            (ray, rgb(light.intensity) * f64::from(light.area), None)
+            let flight = rgb(light.direction);
+            let plane = rgb(light.position);
+            let disc = target.unwrap_or(Sphere {
+                centre: plane,
+                radius: (f64::from(light.area) / PI).sqrt(),
+            });
+            let area = target.map_or(f64::from(light.area), |target| PI * target.radius.powi(2));
+            let passed = point_across(disc, flight, place);
+            // From a plane before the scene.
+            let back = target.map_or(0.0, |_| flight.dot(passed - plane));
+            from_afar(passed, passed - flight * back, flight, rgb(light.intensity) * area)
         }
         ENVIRONMENT_LIGHT => {
             let environment = Environment::of(&inputs.scene.environment);
             let (towards, sky) = environment.sample(direction.x, direction.y);
-            let radius = (f64::from(light.area) / PI).sqrt();
-            let ray = from_afar(towards * radius, -towards, light, place);
-            (ray, sky.radiance * f64::from(light.area) / sky.density, None)
+            let scene = Sphere {
+                centre: DVec3::ZERO,
+                radius: (f64::from(light.area) / PI).sqrt(),
+            };
+            let disc = target.unwrap_or(scene);
+            let area = target.map_or(f64::from(light.area), |target| PI * target.radius.powi(2));
+            let passed = point_across(disc, -towards, place);
+            let origin = passed + towards * (scene.radius - disc.centre.dot(towards));
+            from_afar(passed, origin, -towards, sky.radiance * area / sky.density)
         }
-        _ => from_triangle(inputs, light, place, direction, side),
-    };
-    Emission {
-        ray,
-        flux: flux / f64::from(light.probability),
-        ignored,
-        inverse_range: light.inverse_range.into(),
+        _ => from_triangle(inputs, light, place, direction, side, target),
     }
 }
+
+fn from_afar(passed: DVec3, origin: DVec3, direction: DVec3, flux: DVec3) -> Start {
+    Start {
+        ray: Ray { origin, direction },
+        flux,
+        ignored: None,
+        passed: Some(passed),
+        on_target: true,
+    }
+}
+
+/// A point of the disc across a direction that covers a sphere.
+fn point_across(sphere: Sphere, direction: DVec3, u: DVec2) -> DVec3 {
+    sphere.centre + basis(direction) * (sphere.radius * disc_point(u.x, u.y)).extend(0.0)
+}
+
+fn from_point(light: &Light, u: DVec2, target: Option<Sphere>) -> Start {
+    let position = rgb(light.position);
+    let (axis, versine) = target.map_or((DVec3::Z, 2.0), |target| target.cone(position));
+    let is_spot = light.kind == SPOT_LIGHT;
+    let (off_spot, spot_solid_angle) = if is_spot { spot_versine(light, u.x) } else { (0.0, 0.0) };
+    let mut solid_angle = 2.0 * PI * versine;
+    let mut falloff = 1.0;
+    let by_intensity = is_spot && (target.is_none() || solid_angle >= spot_solid_angle);
+    let direction = if by_intensity {
+        solid_angle = spot_solid_angle;
+        direction_off(rgb(light.direction), off_spot, u.y)
+    } else if target.is_none() {
+        direction_off(axis, 2.0 * u.x, u.y)
+    } else {
+        let direction = direction_in_cone(axis, versine, u);
+        if is_spot {
+            falloff = spot_falloff(light, 0.5 * (direction - rgb(light.direction)).length_squared());
+        }
+        direction
+    };
+    Start {
+        ray: Ray {
+            origin: position,
+            direction,
+        },
+        flux: rgb(light.intensity) * (falloff * solid_angle),
+        ignored: None,
+        passed: None,
+        on_target: !by_intensity,
+    }
+}
+
+/// Where a sphere takes up more than this of the directions, sin² of its cone's angle, they are chosen by their cosine.
+const WIDE_CONE: f64 = 0.5;
 
 /// From a point of a triangle, on its front or, if both sides shine, by `side` on either of them.
 fn from_triangle(
     inputs: &Inputs<'_>,
     light: &Light,
     place: DVec2,
-    direction: DVec2,
+    u: DVec2,
     side: f64,
-) -> (Ray, DVec3, Option<PlacedTriangle>) {
-    let (u, v) = triangle_point(place.x, place.y);
-    let mut emitter = surface_at(inputs.scene, PlacedTriangle::unplaced(light.triangle), u, v);
+    target: Option<Sphere>,
+) -> Start {
+    let (x, y) = triangle_point(place.x, place.y);
+    let triangle = PlacedTriangle::unplaced(light.triangle);
+    let mut emitter = surface_at(inputs.scene, triangle, x, y);
     apply_textures(inputs.scene, &mut emitter);
     let both_sides = emits(&emitter.material, false);
     let normal = if both_sides && side < 0.5 {
@@ -86,22 +276,33 @@ fn from_triangle(
         emitter.geometric_normal
     };
     let sides = if both_sides { 2.0 } else { 1.0 };
-    let ray = Ray {
-        origin: offset_origin(emitter.position, normal, emitter.reach),
-        direction: cosine_direction(normal, direction.x, direction.y),
+    let origin = offset_origin(emitter.position, normal, emitter.reach);
+    let seen_narrow = |target: &Sphere| target.radius.powi(2) < WIDE_CONE * (target.centre - origin).length_squared();
+    let narrow = target.filter(seen_narrow);
+    // Solid angle times cosine, of directions as dense as the chosen one.
+    let (direction, projected) = match narrow {
+        Some(target) => {
+            let (axis, versine) = target.cone(origin);
+            let direction = direction_in_cone(axis, versine, u);
+            (direction, direction.dot(normal).max(0.0) * 2.0 * PI * versine)
+        }
+        None => (cosine_direction(normal, u.x, u.y), PI),
     };
-    let radiance = emitted_radiance(&emitter.material, ray.direction.dot(normal));
-    let flux = radiance * (PI * sides * f64::from(light.area) * share_there(inputs.scene, &emitter));
-    (ray, flux, Some(PlacedTriangle::unplaced(light.triangle)))
+    let radiance = emitted_radiance(&emitter.material, direction.dot(normal).max(0.0));
+    Start {
+        ray: Ray { origin, direction },
+        flux: radiance * (projected * sides * f64::from(light.area) * share_there(inputs.scene, &emitter)),
+        ignored: Some(triangle),
+        passed: None,
+        on_target: narrow.is_some(),
+    }
 }
 
-/// From a disc across the direction of flight that covers the scene.
-fn from_afar(centre: DVec3, direction: DVec3, light: &Light, place: DVec2) -> Ray {
-    let radius = (f64::from(light.area) / PI).sqrt();
-    Ray {
-        origin: centre + basis(direction) * (radius * disc_point(place.x, place.y)).extend(0.0),
-        direction,
-    }
+/// A direction uniform in a cone around an axis, with 1 − cos of the angle between its sides and the axis.
+fn direction_in_cone(axis: DVec3, versine: f64, u: DVec2) -> DVec3 {
+    let p = disc_point(u.x, u.y);
+    let off = p.length_squared() * versine;
+    (basis(axis) * (p * (versine * (2.0 - off)).max(0.0).sqrt()).extend(1.0 - off)).normalize()
 }
 
 /// A direction around an axis, with 1 − cos of the angle between them.
@@ -125,39 +326,4 @@ fn spot_versine(light: &Light, u: f64) -> (f64, f64) {
         whole - from_outside
     };
     (versine, 2.0 * PI * whole)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cpu::light::spot_falloff;
-    use bytemuck::Zeroable;
-
-    /// The part of a spot's photons within an angle is the part of its intensity's integral there.
-    #[test]
-    fn photons_of_a_spot_are_spread_as_its_intensity() {
-        let light = Light {
-            inner: 0.1,
-            outer: 0.4,
-            ..Light::zeroed()
-        };
-        const STEPS: u32 = 100_000;
-        let mut integral = 0.0;
-        let step = 0.4 / f64::from(STEPS);
-        let (_, solid_angle) = spot_versine(&light, 0.0);
-        for i in 0..STEPS {
-            let versine = (f64::from(i) + 0.5) * step;
-            integral += spot_falloff(&light, versine) * step;
-            if i % 10_000 == 9_999 {
-                let within = 2.0 * PI * integral / solid_angle;
-                let (found, _) = spot_versine(&light, (1.0 - within).max(0.0));
-                let expected = f64::from(i + 1) * step;
-                assert!(
-                    spot_falloff(&light, expected) < 1e-6 || (found - expected).abs() < 1e-4,
-                    "{found} instead of {expected}"
-                );
-            }
-        }
-        assert!((2.0 * PI * integral / solid_angle - 1.0).abs() < 1e-6, "{integral}");
-    }
 }

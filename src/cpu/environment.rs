@@ -120,8 +120,8 @@ fn probability(entries: &[[f32; 4]], index: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::random::{PathKind, Random};
     use crate::film::Image;
+    use crate::random::{PathKind, Random};
     use crate::scene;
 
     /// The densities of all directions integrate to 1, and directions are chosen by them: so means of radiance over density

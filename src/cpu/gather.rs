@@ -9,7 +9,7 @@ use super::gloss::Reflector;
 use super::sampling::decode_direction;
 use super::vector::{mean, word, xyz};
 use crate::error::{Error, Result};
-use crate::layout::{Gathered, NO_OBJECT, Photon, Statistics, VisiblePoint};
+use crate::layout::{CAUSTIC, Gathered, NO_OBJECT, Photon, VisiblePoint};
 
 /// How much farther than R the kd-tree is asked: more than the rounding of the squared distance, which the tree and
 /// the predicate sum up differently.
@@ -43,6 +43,7 @@ impl Sum {
 struct Receiver {
     position: [f32; 3],
     radius2: f32,
+    /// With its map's bit, as photons have it.
     object: u32,
     normal: DVec3,
     shading_normal: DVec3,
@@ -56,12 +57,12 @@ fn position(position_object: [f32; 4]) -> [f32; 3] {
 
 impl Receiver {
     /// `None` where the path met no matte surface.
-    fn new(point: &VisiblePoint, statistics: &Statistics, reflector: Option<(Reflector, DVec3)>) -> Option<Self> {
+    fn new(point: &VisiblePoint, map: usize, radius2: f32, reflector: Option<(Reflector, DVec3)>) -> Option<Self> {
         let object = word(point.position_object);
         (object != NO_OBJECT).then(|| Self {
             position: position(point.position_object),
-            radius2: statistics.radius2_high,
-            object,
+            radius2,
+            object: if map == 1 { object | CAUSTIC } else { object },
             normal: decode_direction(word(point.weight_normal)),
             shading_normal: decode_direction(word(point.emitted_normal)),
             reflector,
@@ -85,16 +86,18 @@ impl Receiver {
     }
 }
 
-/// Adds to each slot what `gather` sums up for its receiver.
+/// Adds to each slot, for each photon map, what `gather` sums up for its receiver. `radii2` and `gathered` have all slots of
+/// one map, then those of the next.
 fn for_each_receiver(
     seen: SeenSlice<'_>,
-    statistics: &[Statistics],
+    radii2: &[f32],
     gathered: &mut [Gathered],
     gather: impl Fn(&Receiver, &mut Sum) + Sync,
 ) {
-    let slots = gathered.par_iter_mut().zip(seen.points).zip(statistics).enumerate();
-    slots.for_each(|(slot, ((gathered, point), statistics))| {
-        if let Some(receiver) = Receiver::new(point, statistics, seen.reflector(slot)) {
+    let receivers = gathered.par_iter_mut().zip(radii2).enumerate();
+    receivers.for_each(|(index, (gathered, &radius2))| {
+        let (map, slot) = (index / seen.points.len(), index % seen.points.len());
+        if let Some(receiver) = Receiver::new(&seen.points[slot], map, radius2, seen.reflector(slot)) {
             let mut sum = Sum::default();
             gather(&receiver, &mut sum);
             sum.add_to(gathered);
@@ -102,25 +105,20 @@ fn for_each_receiver(
     });
 }
 
-/// Adds to each slot the photons that it accepts, by testing every photon.
-pub fn gather_naive<'a>(
-    seen: impl Into<SeenSlice<'a>>,
-    statistics: &[Statistics],
-    photons: &[Photon],
-    gathered: &mut [Gathered],
-) {
-    for_each_receiver(seen.into(), statistics, gathered, |receiver, sum| {
+/// Adds to each slot, for each photon map, the photons that it accepts, by testing every photon. `radii2`: R² of each.
+pub fn gather_naive<'a>(seen: impl Into<SeenSlice<'a>>, radii2: &[f32], photons: &[Photon], gathered: &mut [Gathered]) {
+    for_each_receiver(seen.into(), radii2, gathered, |receiver, sum| {
         photons.iter().for_each(|photon| receiver.gather(photon, sum));
     });
 }
 
-/// Adds to each slot the photons that it accepts, by asking a kd-tree for those nearby: the paper's CPU version.
+/// The same by asking a kd-tree for those nearby: the paper's CPU version.
 ///
 /// # Errors
 /// [`Error::Config`] if there are more photons than the tree can number.
 pub fn gather_kd_tree<'a>(
     seen: impl Into<SeenSlice<'a>>,
-    statistics: &[Statistics],
+    radii2: &[f32],
     photons: &[Photon],
     gathered: &mut [Gathered],
 ) -> Result<()> {
@@ -130,7 +128,7 @@ pub fn gather_kd_tree<'a>(
     let positions: Vec<[f32; 3]> = photons.iter().map(|photon| position(photon.position_object)).collect();
     let tree = ImmutableKdTree::new_from_slice(&positions)
         .map_err(|error| Error::Config(format!("kd-tree: {error}; try fewer --photons")))?;
-    for_each_receiver(seen.into(), statistics, gathered, |receiver, sum| {
+    for_each_receiver(seen.into(), radii2, gathered, |receiver, sum| {
         tree.query(&receiver.position)
             .within::<SquaredEuclidean<f32>>(receiver.radius2 * MARGIN)
             .unsorted()

@@ -7,11 +7,11 @@ use super::contact::{Encounter, transmittance};
 use super::gloss::Reflector;
 use super::intersect::Ray;
 use super::light::{Arriving, arriving_from, choose_light, is_punctual};
-use super::random::Random;
 use super::surface::{DIELECTRIC, Facing};
 use super::texture::nearest_visible;
 use super::{FAR, Inputs};
 use crate::layout::{DIRECTIONAL_LIGHT, Light, Material};
+use crate::random::Random;
 
 /// Of 65,536 numbers of faces that a ray passes, the last.
 const FIRST_OF_GLINT: u32 = 65_520;
@@ -121,8 +121,8 @@ mod tests {
 
     use bytemuck::Zeroable;
 
-    use super::super::random::PathKind;
     use super::*;
+    use crate::random::PathKind;
 
     fn glass(roughness: f32, thin: bool) -> Material {
         Material {

@@ -11,8 +11,6 @@ use crate::layout::{Gloss, Material};
 
 /// Below this α a boundary is a mirror.
 pub const SMOOTH_ALPHA: f64 = 1e-3;
-/// Below this α camera paths follow reflections.
-pub(super) const FOLLOWED_ALPHA: f64 = 0.1;
 
 pub(super) fn schlick(cosine: f64) -> f64 {
     (1.0 - cosine).clamp(0.0, 1.0).powi(5)

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::gloss::coat_passes;
 use super::vector::rgb;
+use crate::alias::{self, AliasCell};
 use crate::layout::{BACK_EMITS, DIRECTIONAL_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT};
 
 /// A light, and what is left of the number that chose it, uniform in [0, 1].
@@ -14,21 +15,13 @@ pub(super) struct Choice<'a> {
 
 /// By the alias method, with the digits of `u` in [0, 1) and of two more numbers below it.
 pub(super) fn choose_light(lights: &[Light], u: f64, digits: [f64; 2]) -> Choice<'_> {
-    let [first, second, third] = [u, digits[0], digits[1]].map(|number| (number * f64::from(1 << 24)) as u64);
-    // A fraction of 64 bits times the number of cells.
-    let fraction = first << 40 | second << 16 | third >> 8;
-    let product = u128::from(fraction) * lights.len() as u128;
-    let cell = &lights[(product >> 64) as usize];
-    let within = (product as u64) as f64 / 2f64.powi(64);
-    let accept = f64::from(cell.accept);
-    if within < accept || accept >= 1.0 {
-        let rest = (within / accept).min(1.0);
-        Choice { light: cell, rest }
-    } else {
-        Choice {
-            light: &lights[cell.alias as usize],
-            rest: ((within - accept) / (1.0 - accept)).min(1.0),
-        }
+    let alias::Choice { index, rest } = alias::choose(lights.len(), u, digits, |cell| AliasCell {
+        accept: lights[cell].accept,
+        alias: lights[cell].alias,
+    });
+    Choice {
+        light: &lights[index],
+        rest,
     }
 }
 
@@ -99,7 +92,7 @@ pub(super) fn arriving_from(light: &Light, point: DVec3) -> Arriving {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::random::{PathKind, Random};
+    use crate::random::{PathKind, Random};
     use crate::scene::set_alias_table;
     use bytemuck::Zeroable;
 

@@ -13,6 +13,7 @@ mod boundary;
 mod camera;
 mod contact;
 mod coverage;
+mod demand;
 mod direct;
 mod dispersion;
 mod emission;
@@ -24,11 +25,9 @@ mod intersect;
 mod light;
 mod photons;
 mod primitives;
-mod random;
 mod renderer;
 mod resolve;
 mod sampling;
-mod sobol;
 mod surface;
 mod texture;
 mod tiles;
@@ -37,22 +36,24 @@ mod vector;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+pub use crate::random::{PathKind, Random, pcg4d};
 pub use camera::{Seen, SeenSlice, camera};
 pub use coverage::coverage;
+pub use demand::{Demand, Progress, demand, grid_shape, shell_radii};
 pub use direct::direct;
 pub use gather::{gather_kd_tree, gather_naive};
 pub use gloss::Reflector;
 pub use intersect::{Hit, PlacedTriangle, Ray, is_blocked, nearest_hit};
-pub use photons::{Batch, compact, photons};
+pub use photons::{Batch, Traced, compact, photons};
 pub use primitives::{scan, sort};
-pub use random::{PathKind, Random, pcg4d};
 pub use renderer::Renderer;
 pub use resolve::resolve;
 pub use sampling::{decode_direction, encode_direction};
 pub use tiles::pixel_of;
-pub use update::{fit_radius, radius_sums, reset, update};
+pub use update::{fit_radius, radii, reset, update};
 
 use crate::config::RenderConfig;
+use crate::emission::Table;
 use crate::layout::Settings;
 use crate::scene::PackedScene;
 
@@ -68,6 +69,10 @@ pub struct Inputs<'a> {
     pub settings: &'a Settings,
     /// What the kernels are specialised for.
     pub config: &'a RenderConfig,
+    /// What visible points want of photons; none where all are kept.
+    pub demand: Option<&'a Demand>,
+    /// Where photon paths are aimed; without it they start in proportion to the lights' power.
+    pub emission: Option<&'a Table>,
 }
 
 /// What the stages count, as [`crate::layout::StatusCounters`] on a device.
@@ -75,6 +80,7 @@ pub struct Inputs<'a> {
 pub struct Counts {
     truncated_paths: AtomicU64,
     non_finite: AtomicU64,
+    landed: AtomicU64,
 }
 
 impl Counts {
@@ -86,6 +92,15 @@ impl Counts {
     /// Values that were NaN or infinite and were left out.
     pub fn non_finite(&self) -> u64 {
         self.non_finite.load(Ordering::Relaxed)
+    }
+
+    /// Photons that landed where visible points could be, wanted or not.
+    pub fn landed(&self) -> u64 {
+        self.landed.load(Ordering::Relaxed)
+    }
+
+    fn add_landed(&self, photons: u64) {
+        self.landed.fetch_add(photons, Ordering::Relaxed);
     }
 
     fn add_truncated(&self, paths: u64) {

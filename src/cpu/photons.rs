@@ -6,18 +6,19 @@ use rayon::prelude::*;
 use super::boundary::Boundary;
 use super::contact::{Encounter, choose_part, transmittance};
 use super::dispersion::disperse;
-use super::emission::emit;
-use super::gloss::{FOLLOWED_ALPHA, Reflector};
+use super::emission::{emit, guide};
+use super::gloss::Reflector;
 use super::intersect::{PlacedTriangle, Ray};
 use super::light::range_window;
-use super::random::Random;
 use super::sampling::{cosine_direction, encode_direction};
 use super::surface::{GLOSSY, MATTE, MIRROR};
 use super::texture::{nearest_visible, share_there};
-use super::vector::{rgb, with_word};
-use super::{Counts, FAR, Inputs};
+use super::vector::{mean, rgb, with_word};
+use super::{Counts, Demand, FAR, Inputs};
 use crate::config::Direct;
-use crate::layout::{Material, Photon};
+use crate::emission::PathValue;
+use crate::layout::{CAUSTIC, FOLLOWED_ALPHA, Material, Photon};
+use crate::random::Random;
 
 /// Photon paths that are followed together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,18 +31,32 @@ pub struct Batch {
     pub paths: u32,
 }
 
-/// Follows a batch of photon paths. The photons of each lane, in path order: lane i of n follows the paths i, i + n,
-/// i + 2n, …
-pub fn photons(inputs: &Inputs<'_>, batch: Batch, counts: &Counts) -> Vec<Vec<Photon>> {
+/// What a batch of photon paths left behind.
+#[derive(Debug, Clone, Default)]
+pub struct Traced {
+    /// The photons of each lane, in path order: lane i of n follows the paths i, i + n, i + 2n, …
+    pub lanes: Vec<Vec<Photon>>,
+    /// What each path was worth, in path order: [`PathValue::packed`].
+    pub values: Vec<u32>,
+}
+
+/// Follows a batch of photon paths.
+pub fn photons(inputs: &Inputs<'_>, batch: Batch, counts: &Counts) -> Traced {
     let lanes = inputs.settings.photon_lanes;
     let follow_lane = |lane: u32| {
-        let mut photons = Vec::new();
+        let (mut photons, mut values) = (Vec::new(), Vec::new());
         for path in (lane..batch.paths).step_by(lanes as usize) {
-            follow(inputs, batch.first_path + path, batch.iteration, &mut photons, counts);
+            let value = follow(inputs, batch.first_path + path, batch.iteration, &mut photons, counts);
+            values.push(value.packed());
         }
-        photons
+        (photons, values)
     };
-    (0..lanes).into_par_iter().map(follow_lane).collect()
+    let (photons, of_lanes): (Vec<_>, Vec<_>) = (0..lanes).into_par_iter().map(follow_lane).unzip();
+    let value_of = |path: u32| of_lanes[(path % lanes) as usize][(path / lanes) as usize];
+    Traced {
+        lanes: photons,
+        values: (0..batch.paths).map(value_of).collect(),
+    }
 }
 
 /// The photons of all lanes, one lane after the other.
@@ -57,8 +72,10 @@ struct Path {
     medium: Option<u32>,
     /// Of its light, nm.
     wavelength: Option<f64>,
-    /// No specular bounce since the light: direct light, which the stage `direct` samples.
+    /// No bounce since the light: direct light, which the stage `direct` samples.
     seen_directly: bool,
+    /// Mirrors and glass alone since the light.
+    caustic: bool,
     /// Of the light, until the first surface.
     inverse_range: f64,
 }
@@ -75,10 +92,12 @@ fn roulette(arriving: DVec3, scattered: DVec3, u: f64) -> Option<DVec3> {
     (u < probability).then(|| scattered / probability)
 }
 
-fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Photon>, counts: &Counts) {
+/// Returns what the path was worth, for where later ones are aimed.
+fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Photon>, counts: &Counts) -> PathValue {
+    let mut value = PathValue { value: 0.0, rays: 0 };
     let settings = inputs.settings;
     let samples_lights = inputs.config.direct == Direct::Light;
-    let mut random = Random::of_photon(inputs, path, iteration);
+    let mut random = Random::of_photon(inputs.config, path, iteration);
     let emission = emit(inputs, &mut random);
     let mut path = Path {
         ray: emission.ray,
@@ -87,14 +106,16 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         medium: None,
         wavelength: None,
         seen_directly: true,
+        caustic: true,
         inverse_range: emission.inverse_range,
     };
     for _ in 0..settings.max_depth {
         if path.flux.max_element() <= 0.0 {
-            return;
+            return value;
         }
+        value.rays += 1;
         let Some(hit) = nearest_visible(inputs, path.ray, FAR, path.ignored, &random) else {
-            return;
+            return value;
         };
         let incoming = path.ray.direction;
         let met = Encounter::new(inputs, hit, incoming, path.medium);
@@ -104,7 +125,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         // A range is how far the light itself reaches, not what it lights.
         path.flux *= range_window(path.inverse_range, hit.t);
         if path.flux.max_element() <= 0.0 {
-            return;
+            return value;
         }
         let mut u = random.next4();
         let (mixed, rest) = choose_part(&mut material, u[3]);
@@ -117,17 +138,30 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             landing *= facing.landing_correction(incoming);
             if !landing.is_finite() {
                 counts.add_non_finite(1);
-                return;
+                return value;
             }
             if !(samples_lights && path.seen_directly) {
-                photons.push(Photon {
-                    position_object: with_word(surface.position, surface.object),
-                    // What is there in part is seen in part as well as met in part.
-                    flux_direction: with_word(
-                        landing / share_there(inputs.scene, &surface),
-                        encode_direction(incoming),
-                    ),
-                });
+                counts.add_landed(1);
+                let (map, map_bit) = if settings.photon_maps > 1 && path.caustic && !path.seen_directly {
+                    (1, CAUSTIC)
+                } else {
+                    (0, 0)
+                };
+                let position = surface.position.as_vec3();
+                let at = |demand: &Demand| demand.at(settings, position, surface.object, map);
+                let wanted = inputs.demand.map_or(1.0, at);
+                if wanted > 0.0 {
+                    let worth = f64::from(wanted) * mean(landing).powi(2);
+                    value.value = (f64::from(value.value) + worth).min(1e37) as f32;
+                    photons.push(Photon {
+                        position_object: with_word(surface.position, surface.object | map_bit),
+                        // What is there in part is seen in part as well as met in part.
+                        flux_direction: with_word(
+                            landing / share_there(inputs.scene, &surface),
+                            encode_direction(incoming),
+                        ),
+                    });
+                }
             }
         }
         let mut layer = 1.0;
@@ -140,16 +174,20 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         let (mut medium, mut wavelength) = (path.medium, path.wavelength);
         let (direction, flux) = if scatters(&material) {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
-            let outgoing = cosine_direction(facing.geometric_normal, choice, second);
-            let (outgoing, weight) = if kind == GLOSSY {
-                facing.scatter(&Reflector::of_material(&material), incoming, u, outgoing)
+            let cosine = cosine_direction(facing.geometric_normal, choice, second);
+            let (outgoing, weight, guided) = if kind == GLOSSY {
+                let (outgoing, weight) = facing.scatter(&Reflector::of_material(&material), incoming, u, cosine);
+                (outgoing, weight, 1.0)
             } else {
-                (outgoing, rgb(material.base_color))
+                let position = surface.position;
+                let (outgoing, guided) = guide(inputs, position, facing.geometric_normal, u, cosine);
+                (outgoing, rgb(material.base_color), guided)
             };
-            let scattered = roulette(path.flux, landing * weight, survival);
+            // Those that are aimed shall come there, with less flux each.
+            let scattered = roulette(path.flux, landing * weight, survival).map(|flux| flux * guided);
             (
                 outgoing,
-                scattered.filter(|_| outgoing.dot(facing.shading_normal) > 0.0),
+                scattered.filter(|_| guided > 0.0 && outgoing.dot(facing.shading_normal) > 0.0),
             )
         } else if kind == MIRROR {
             let reflected = path.flux * layer * facing.mirror_reflectance(&material, incoming);
@@ -166,7 +204,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             medium = side;
             (direction, roulette(path.flux, path.flux * layer * weight, survival))
         };
-        let Some(flux) = flux else { return };
+        let Some(flux) = flux else { return value };
         path = Path {
             ray: Ray {
                 origin: surface.origin_towards(direction),
@@ -177,8 +215,10 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             medium,
             wavelength,
             seen_directly: false,
+            caustic: path.caustic && !scatters(&material),
             inverse_range: 0.0,
         };
     }
     counts.add_truncated(1);
+    value
 }

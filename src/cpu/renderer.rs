@@ -5,11 +5,12 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::{
-    Batch, Counts, Inputs, Seen, camera, compact, coverage, direct, fit_radius, gather_kd_tree, gather_naive, photons,
-    reset, resolve, update,
+    Batch, Counts, Demand, Inputs, Progress, Seen, camera, compact, coverage, demand, direct, fit_radius,
+    gather_kd_tree, gather_naive, grid_shape, photons, radii, reset, resolve, shell_radii, update,
 };
-use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
-use crate::config::{Estimator, Limits, RenderConfig, Sizes};
+use crate::backend::{Backend, Counters, DeviceDescription, Resolved, demand_floor2, settings};
+use crate::config::{EmissionChoice, Estimator, Limits, RenderConfig, Sizes};
+use crate::emission::{Aim, PILOT_ROUNDS, is_learned_from, pilot_iteration};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
 use crate::layout::{Coverage, DirectSum, Gathered, Settings, Statistics};
@@ -34,9 +35,14 @@ pub struct Renderer {
     gathered: Vec<Gathered>,
     direct_sums: Vec<DirectSum>,
     coverage: Vec<Coverage>,
+    /// Median of the initial radii.
+    radius: f32,
+    photon_flux: Option<f64>,
     iterations: u32,
     emitted: u64,
     counters: Counters,
+    /// Of photon paths, if they are aimed.
+    aim: Option<Aim>,
     made: Instant,
 }
 
@@ -59,32 +65,37 @@ impl Renderer {
             loop_limit: u32::MAX,
             lanes: LANES,
             splitting: scene.features.dielectric || scene.features.glossy,
+            specular: scene.features.mirror || scene.features.dielectric,
             glossy: scene.features.glossy,
             meshes: scene.object_grids.len() as u32,
             object_cells: scene.object_cells,
         };
         let sizes = Sizes::new(&config, limits);
-        let slots = sizes.slots() as usize;
+        let (slots, receivers) = (sizes.slots() as usize, sizes.receivers() as usize);
         let mut renderer = Self {
             scene: scene.clone(),
             sizes,
             settings: Settings {
                 slots_per_pixel: sizes.slots_per_pixel,
                 photon_lanes: sizes.photon_lanes,
+                photon_maps: sizes.photon_maps,
                 ..settings(&config, scene, camera, limits.loop_limit)
             },
             config,
             seen: Seen::default(),
-            statistics: Vec::new(),
-            gathered: vec![Gathered::zeroed(); slots],
+            statistics: vec![reset(0.0); receivers],
+            gathered: vec![Gathered::zeroed(); receivers],
             direct_sums: vec![DirectSum::zeroed(); slots],
-            coverage: vec![Coverage::zeroed(); slots],
+            coverage: vec![Coverage::zeroed(); receivers],
+            radius: 0.0,
+            photon_flux: None,
             iterations: 0,
             emitted: 0,
             counters: Counters::default(),
+            aim: None,
             made: Instant::now(),
         };
-        renderer.choose_radius()?;
+        renderer.prepare()?;
         Ok(renderer)
     }
 
@@ -93,54 +104,144 @@ impl Renderer {
         &self.settings
     }
 
-    /// R², N and τ of each slot.
+    /// R², N and τ of each slot, for each photon map.
     pub fn statistics(&self) -> &[Statistics] {
         &self.statistics
     }
 
-    /// Takes the user's radius, or finds one from the density of pilot photons: one for the median visible point, then
-    /// smaller ones where the photons are denser. Resets the statistics.
-    fn choose_radius(&mut self) -> Result<()> {
-        let slots = self.sizes.slots() as usize;
-        if self.config.radius.is_some() {
-            self.statistics = vec![reset(self.settings.initial_radius2); slots];
-            return Ok(());
-        }
-        let inputs = Inputs {
+    /// What the stages read, without what visible points want of photons.
+    fn inputs(&self) -> Inputs<'_> {
+        Inputs {
             scene: &self.scene,
             settings: &self.settings,
             config: &self.config,
-        };
-        let counts = Counts::default();
-        let seen = camera(&inputs, 0, &counts);
-        let photons = compact(&photons(
-            &inputs,
-            batch_of(&self.sizes, &self.config, radius::PILOT, 0),
-            &counts,
-        ));
-        // The pilot is a batch; the densities of the whole iteration's photons are higher.
-        let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
-        let automatic = radius::automatic(&seen.points, &photons);
-        self.settings.initial_radius2 = automatic.radius2 * share;
-        self.statistics = vec![reset(self.settings.initial_radius2); slots];
-        for _ in 0..radius::FITS {
-            gather_kd_tree(&seen, &self.statistics, &photons, &mut self.gathered)?;
-            let wanted = automatic.photons as f32 * share;
-            fit_radius(wanted, &mut self.gathered, &mut self.statistics);
+            demand: None,
+            emission: self.aim.as_ref().map(Aim::table),
         }
+    }
+
+    /// Where photon paths start that are aimed; `None` for those that aren't.
+    pub fn aim(&self) -> Option<&Aim> {
+        self.aim.as_ref()
+    }
+
+    /// Aims photon paths by pilot rounds, if they are to be aimed, at what discs of a pilot want; then finds the
+    /// radii.
+    fn prepare(&mut self) -> Result<()> {
+        let counts = Counts::default();
+        let seen = camera(&self.inputs(), 0, &counts);
+        let mut of_pilot = vec![reset(0.0); self.statistics.len()];
+        let radii2 = radii(&self.settings, &seen, &mut of_pilot);
+        let demand = self.demand(&seen, &radii2);
+        if self.config.emission == EmissionChoice::Aimed {
+            self.aim = Some(Aim::new(&self.scene, &seen.points));
+            for round in 0..PILOT_ROUNDS {
+                let batch = Batch {
+                    iteration: pilot_iteration(round),
+                    first_path: 0,
+                    paths: self.sizes.pilot_paths(self.config.photons),
+                };
+                let inputs = Inputs {
+                    demand: demand.as_ref(),
+                    ..self.inputs()
+                };
+                let values = photons(&inputs, batch, &counts).values;
+                if let Some(aim) = &mut self.aim {
+                    aim.learn(&self.config, batch.iteration, 0, &values);
+                    if round + 1 < PILOT_ROUNDS {
+                        aim.update();
+                    }
+                }
+            }
+            let anyway = self.config.aims_anyway;
+            self.aim = self.aim.take().filter(|aim| anyway || aim.is_worth_it());
+            if let Some(aim) = &mut self.aim {
+                aim.update();
+            }
+        }
+        self.choose_radius(&seen, demand.as_ref())
+    }
+
+    /// Takes the user's radius, or finds first radii from the density of pilot photons: one that suits the median visible
+    /// point, then smaller ones where the photons are denser.
+    fn choose_radius(&mut self, seen: &Seen, demand: Option<&Demand>) -> Result<()> {
+        if self.config.radius.is_none() {
+            let inputs = Inputs {
+                demand,
+                ..self.inputs()
+            };
+            let batch = batch_of(&self.sizes, &self.config, radius::PILOT, 0);
+            let counts = Counts::default();
+            let photons = compact(&photons(&inputs, batch, &counts).lanes);
+            let dropping = radius::is_dropping_worth_it(counts.landed(), photons.len() as u64, self.aim.is_some());
+            // The pilot is a batch; the densities of the whole iteration's photons are higher.
+            let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
+            self.config.drop_unwanted &= dropping;
+            self.photon_flux = radius::mean_flux(&photons);
+            let first = radius::first(&seen.points, &seen.footprints, &photons, share);
+            self.settings.first_footprints = first.map(|first| first.footprints);
+            let wanted = first.map(|first| first.photons as f32 * share);
+            for _ in 0..radius::FITS {
+                let radii2 = radii(&self.settings, seen, &mut self.statistics);
+                gather_kd_tree(seen, &radii2, &photons, &mut self.gathered)?;
+                fit_radius(
+                    wanted,
+                    radius::LEAST_FOOTPRINTS,
+                    &seen.footprints,
+                    &mut self.gathered,
+                    &mut self.statistics,
+                );
+            }
+            if self.sizes.photon_maps == 2 {
+                let caustic = &mut self.statistics[seen.points.len()..];
+                radius::sharpen(self.config.resolution, &seen.footprints, caustic);
+            }
+        } else {
+            radii(&self.settings, seen, &mut self.statistics);
+        }
+        self.radius = radius::median(&self.statistics[..seen.points.len()]);
         Ok(())
+    }
+
+    /// What visible points with discs of `radii2` want of photons.
+    fn demand(&self, seen: &Seen, radii2: &[f32]) -> Option<Demand> {
+        if !self.config.drops_unwanted() {
+            return None;
+        }
+        let step = self.sizes.radius_step();
+        let grid = grid_shape(&shell_radii(&self.settings, &seen.points, radii2, step));
+        let progress = Progress {
+            statistics: &self.statistics,
+            coverage: &self.coverage,
+            direct_sums: &self.direct_sums,
+            iterations: self.iterations,
+            emitted: self.emitted,
+        };
+        Some(demand(&self.settings, seen, radii2, progress, grid))
     }
 }
 
 impl Backend for Renderer {
     fn iterate(&mut self) -> Result<Run> {
         let iteration = self.iterations;
+        if self.aim.is_some() && self.config.block_of(iteration) == iteration {
+            if iteration > 0 {
+                self.settings.demand_floor2 = demand_floor2(&self.resolve_all()?);
+            }
+            // What an iteration learns changes no other one of its block.
+            if let Some(aim) = &mut self.aim {
+                aim.update();
+            }
+        }
         let inputs = Inputs {
             scene: &self.scene,
             settings: &self.settings,
             config: &self.config,
+            demand: None,
+            emission: self.aim.as_ref().map(Aim::table),
         };
         let counts = Counts::default();
+        let mut values = Vec::new();
         let mut clock = Clock {
             made: self.made,
             run: Run::default(),
@@ -148,57 +249,82 @@ impl Backend for Renderer {
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
             self.seen = clock.time("camera", || camera(&inputs, iteration, &counts));
         }
+        let radii2 = clock.time("radii", || radii(&self.settings, &self.seen, &mut self.statistics));
+        let demand = clock.time("demand", || self.demand(&self.seen, &radii2));
+        let inputs = Inputs {
+            demand: demand.as_ref(),
+            ..inputs
+        };
         for batch in 0..self.sizes.batches(self.config.photons) {
             let batch = batch_of(&self.sizes, &self.config, iteration, batch);
-            let lanes = clock.time("photons", || photons(&inputs, batch, &counts));
-            let photons = clock.time("compact", || compact(&lanes));
-            let (seen, statistics, gathered) = (&self.seen, &self.statistics, &mut self.gathered);
+            let traced = clock.time("photons", || photons(&inputs, batch, &counts));
+            let photons = clock.time("compact", || compact(&traced.lanes));
+            if batch.first_path == 0 {
+                values = traced.values;
+            }
+            let (seen, gathered) = (&self.seen, &mut self.gathered);
             match METHODS[self.config.gather.unwrap_or_else(default_cpu_method)].runs {
                 Runs::CpuNaive => {
-                    clock.time("gather_naive", || gather_naive(seen, statistics, &photons, gathered));
+                    clock.time("gather_naive", || gather_naive(seen, &radii2, &photons, gathered));
                 }
-                _ => clock.time("gather_kd_tree", || {
-                    gather_kd_tree(seen, statistics, &photons, gathered)
-                })?,
+                _ => clock.time("gather_kd_tree", || gather_kd_tree(seen, &radii2, &photons, gathered))?,
             }
             self.counters.photons_stored += photons.len() as u64;
         }
         clock.time("direct", || {
-            direct(&inputs, iteration, &self.seen, &counts, &mut self.direct_sums)
+            let (statistics, sums) = (&self.statistics, &mut self.direct_sums);
+            direct(&inputs, iteration, &self.seen, statistics, &counts, sums);
         });
         if self.config.estimator == Estimator::Sppm {
-            let (points, statistics) = (&self.seen.points, &self.statistics);
+            let points = &self.seen.points;
             clock.time("coverage", || {
-                coverage(&inputs, iteration, points, statistics, &mut self.coverage)
+                coverage(
+                    &inputs,
+                    iteration,
+                    points,
+                    &radii2,
+                    (&self.statistics, &self.gathered),
+                    &mut self.coverage,
+                )
             });
         }
         clock.time("update", || {
             update(
                 &self.seen.points,
+                &radii2,
                 self.config.alpha,
                 &counts,
                 &mut self.gathered,
                 &mut self.statistics,
             );
         });
+        if let Some(aim) = &mut self.aim
+            && is_learned_from(&self.config, iteration)
+        {
+            aim.learn(&self.config, iteration, 0, &values);
+        }
         self.counters.truncated_paths += counts.truncated_paths();
         self.counters.non_finite += counts.non_finite();
+        self.counters.photons_landed += counts.landed();
         self.iterations += 1;
         self.emitted += u64::from(self.config.photons);
         Ok(clock.run)
     }
 
     fn resolve_all(&mut self) -> Result<Resolved> {
+        let accepted = |s: &Statistics| u64::from(s.accepted_low) | u64::from(s.accepted_high) << 32;
+        self.counters.photons_accepted = self.statistics.iter().map(accepted).sum();
         let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
-        let film = resolve(
+        let (film, behind_glass) = resolve(
             &self.settings,
+            &self.seen.points,
             &self.statistics,
             &self.direct_sums,
             &self.coverage,
             iterations,
             emitted,
         );
-        Ok(Resolved::from_film(self.config.resolution, &film))
+        Ok(Resolved::from_film(self.config.resolution, &film, behind_glass))
     }
 
     fn iterations(&self) -> u32 {
@@ -214,7 +340,15 @@ impl Backend for Renderer {
     }
 
     fn radius(&self) -> f32 {
-        self.settings.initial_radius2.sqrt()
+        self.radius
+    }
+
+    fn photon_flux(&self) -> Option<f64> {
+        self.photon_flux
+    }
+
+    fn aims(&self) -> bool {
+        self.aim.is_some()
     }
 
     fn device(&self) -> DeviceDescription {

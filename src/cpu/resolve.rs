@@ -2,11 +2,12 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec4;
+use bytemuck::Zeroable;
+use glam::{DVec3, DVec4};
 
 use super::tiles::{pixel_of, pixel_slots};
-use super::vector::{from_two_float, from_two_floats};
-use crate::layout::{Coverage, DirectSum, Settings, Statistics};
+use super::vector::{from_two_float, from_two_floats, word, xyz};
+use crate::layout::{BehindGlass, Coverage, DirectSum, NO_OBJECT, Settings, Statistics, VisiblePoint};
 
 /// The part of the discs that can have photons; 1 where nothing is known of it.
 fn share_of(coverage: &Coverage) -> f64 {
@@ -17,40 +18,92 @@ fn share_of(coverage: &Coverage) -> f64 {
     }
 }
 
-/// The picture, RGB and curvature (infinite where no photon has come to a surface), row by row from the top left: eq. 4 for each slot of a pixel, and the mean over the
-/// iterations of what was seen directly. `emitted` are the photon paths of all iterations.
+/// Photons that a visible point has accepted, as far as 32 bits hold. What may have brought light behind glass are those of
+/// the last photon map: the caustic ones, or all where nothing tells them apart.
+pub(super) fn photons_of(statistics: &Statistics) -> u32 {
+    if statistics.accepted_high == 0 {
+        statistics.accepted_low
+    } else {
+        u32::MAX
+    }
+}
+
+/// How wide a pixel is at a visible point that is seen directly.
+fn pixel_width(settings: &Settings, position: DVec3) -> f64 {
+    let distance = if settings.camera_up[3] == 0.0 {
+        (position - xyz(settings.camera_position)).length()
+    } else {
+        1.0
+    };
+    f64::from(settings.pixel_spread) * distance
+}
+
+/// The picture, RGB and curvature (infinite where no photon has come to a surface that isn't in the open), row by row from
+/// the top left: eq. 4 for each slot of a pixel and photon map, and the mean over the iterations of what was seen directly.
+/// And what tells how much light behind glass no photon has brought yet. `emitted` are the photon paths of all iterations.
 pub fn resolve(
     settings: &Settings,
+    points: &[VisiblePoint],
     statistics: &[Statistics],
     direct_sums: &[DirectSum],
     coverage: &[Coverage],
     iterations: u32,
     emitted: u64,
-) -> Vec<[f32; 4]> {
+) -> (Vec<[f32; 4]>, Vec<BehindGlass>) {
     let [width, height] = settings.resolution.map(|side| side as usize);
     let slots_per_pixel = settings.slots_per_pixel as usize;
     let mut film = vec![[0.0; 4]; width * height];
+    let mut glass_film = vec![BehindGlass::zeroed(); width * height];
     for pixel_slot in 0..pixel_slots(settings) {
         let Some([x, y]) = pixel_of(settings.resolution, pixel_slot as u32) else {
             continue;
         };
         let mut radiance = DVec4::ZERO;
+        let (mut unbent, mut arrived) = (0.0, 0.0);
+        let mut glass = BehindGlass::zeroed();
         let (mut has_surface, mut has_photons) = (false, false);
         for slot in pixel_slot * slots_per_pixel..(pixel_slot + 1) * slots_per_pixel {
-            let (statistics, direct) = (&statistics[slot], &direct_sums[slot]);
-            has_surface |= coverage[slot].asked > 0;
-            has_photons |= (statistics.accepted_low | statistics.accepted_high) != 0;
-            let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
-            let tau = from_two_floats(statistics.flux_high, statistics.flux_low);
-            radiance += from_two_floats(direct.high, direct.low) / f64::from(iterations);
-            if radius2 > 0.0 {
-                radiance += tau / (PI * radius2 * share_of(&coverage[slot]) * emitted as f64);
+            let direct = &direct_sums[slot];
+            has_surface |= coverage[slot].surrounded > 0;
+            let seen = from_two_floats(direct.high, direct.low) / f64::from(iterations);
+            radiance += seen.truncate().extend(0.0);
+            let unbent_here = if direct.low[3] > 0.0 {
+                f64::from(direct.high[3]) / f64::from(direct.low[3])
+            } else {
+                0.0
+            };
+            unbent += unbent_here;
+            let receivers = (slot..statistics.len()).step_by(direct_sums.len());
+            let through_glass = receivers.clone().next_back();
+            for receiver in receivers {
+                let statistics = &statistics[receiver];
+                has_photons |= (statistics.accepted_low | statistics.accepted_high) != 0;
+                let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
+                let tau = from_two_floats(statistics.flux_high, statistics.flux_low);
+                if radius2 > 0.0 {
+                    let by_photons = tau / (PI * radius2 * share_of(&coverage[receiver]) * emitted as f64);
+                    radiance += by_photons;
+                    if through_glass == Some(receiver) {
+                        arrived += by_photons.truncate().element_sum() / 3.0;
+                    }
+                }
+                let is_seen = word(points[slot].position_object) != NO_OBJECT;
+                if unbent_here > 0.0 && is_seen && through_glass == Some(receiver) {
+                    // Of several slots, what the one with the most photons has.
+                    glass.photons = glass.photons.max(photons_of(statistics) as f32);
+                    let radius = radius2.sqrt() / pixel_width(settings, xyz(points[slot].position_object));
+                    glass.radius = glass.radius.max(radius as f32);
+                    glass.radius2 = glass.radius2.max(radius2 as f32);
+                }
             }
         }
+        (glass.unbent, glass.arrived) = (unbent as f32, arrived as f32);
         if has_surface && !has_photons {
             radiance.w = f64::INFINITY;
         }
-        film[y as usize * width + x as usize] = radiance.as_vec4().to_array();
+        let pixel = y as usize * width + x as usize;
+        film[pixel] = radiance.as_vec4().to_array();
+        glass_film[pixel] = glass;
     }
-    film
+    (film, glass_film)
 }

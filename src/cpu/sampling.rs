@@ -17,15 +17,25 @@ pub(super) fn basis(n: DVec3) -> DMat3 {
     )
 }
 
-/// A point uniform on the unit disc.
+/// A point uniform on the unit disc: Shirley and Chiu, «A Low Distortion Map Between Disk and Square», Journal of Graphics
+/// Tools 2(3), 1997.
 pub(super) fn disc_point(u: f64, v: f64) -> DVec2 {
-    let (sin_phi, cos_phi) = (2.0 * PI * v).sin_cos();
-    u.sqrt() * DVec2::new(cos_phi, sin_phi)
+    let p = 2.0 * DVec2::new(u, v) - 1.0;
+    if p == DVec2::ZERO {
+        return p;
+    }
+    let (radius, phi) = if p.x.abs() > p.y.abs() {
+        (p.x, PI / 4.0 * (p.y / p.x))
+    } else {
+        (p.y, PI / 2.0 - PI / 4.0 * (p.x / p.y))
+    };
+    radius * DVec2::from_angle(phi)
 }
 
 /// A unit vector around the unit vector `n` with density cos θ / π (Malley's method).
 pub(super) fn cosine_direction(n: DVec3, u: f64, v: f64) -> DVec3 {
-    (basis(n) * disc_point(u, v).extend((1.0 - u).sqrt())).normalize()
+    let p = disc_point(u, v);
+    (basis(n) * p.extend((1.0 - p.length_squared()).max(0.0).sqrt())).normalize()
 }
 
 /// Barycentric coordinates (of the second and the third corner) of a point uniform on a triangle.
@@ -61,7 +71,7 @@ pub fn decode_direction(code: u32) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::random::{PathKind, Random};
+    use crate::random::{PathKind, Random};
 
     #[test]
     fn cosine_directions_have_the_moments_of_cos_over_pi() {

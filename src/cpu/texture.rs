@@ -5,11 +5,11 @@ use half::f16;
 
 use super::Inputs;
 use super::intersect::{Hit, PlacedTriangle, Ray, nearest_hit};
-use super::random::Random;
 use super::sampling::decode_direction;
 use super::surface::{Surface, surface_of};
 use super::vector::rgb;
 use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED};
+use crate::random::Random;
 use crate::scene::PackedScene;
 
 /// What a place of a triangle has for textures.

@@ -1,49 +1,11 @@
 //! The order of pixels in memory: `glsl/shared/visible_point.glsl`.
 
 use crate::config::TILE;
+pub use crate::config::pixel_of;
 use crate::layout::Settings;
 
 /// Slots for pixels: whole tiles.
 pub(super) fn pixel_slots(settings: &Settings) -> usize {
     let [across, down] = settings.resolution.map(|side| side.div_ceil(TILE) as usize);
     across * down * (TILE * TILE) as usize
-}
-
-/// The pixel of a slot, `None` where the tile reaches over the picture's edge. Tiles lie row by row; within a tile the
-/// bits of the number inside are, from the lowest, x0 x1 y0 x2 y1 y2.
-pub fn pixel_of(resolution: [u32; 2], pixel_slot: u32) -> Option<[u32; 2]> {
-    let tiles_across = resolution[0].div_ceil(TILE);
-    let (tile, inside) = (pixel_slot / (TILE * TILE), pixel_slot % (TILE * TILE));
-    let bit = |from: u32, to: u32| (inside >> from & 1) << to;
-    let x = tile % tiles_across * TILE + (bit(0, 0) | bit(1, 1) | bit(3, 2));
-    let y = tile / tiles_across * TILE + (bit(2, 0) | bit(4, 1) | bit(5, 2));
-    let [width, height] = resolution;
-    (x < width && y < height).then_some([x, y])
-}
-
-#[cfg(test)]
-mod tests {
-    use std::collections::HashSet;
-
-    use bytemuck::Zeroable;
-
-    use super::*;
-
-    #[test]
-    fn every_pixel_has_one_slot_in_its_tile() {
-        let settings = Settings {
-            resolution: [19, 9],
-            ..Settings::zeroed()
-        };
-        let slots = pixel_slots(&settings) as u32;
-        assert_eq!(slots, 3 * 2 * 64);
-        let mut seen = HashSet::new();
-        for slot in 0..slots {
-            if let Some([x, y]) = pixel_of(settings.resolution, slot) {
-                assert_eq!(slot / 64, y / 8 * 3 + x / 8, "pixel {x}, {y} lies in another tile");
-                assert!(seen.insert([x, y]), "pixel {x}, {y} has two slots");
-            }
-        }
-        assert_eq!(seen.len(), 19 * 9);
-    }
 }

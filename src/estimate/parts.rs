@@ -18,6 +18,8 @@ pub(super) struct Parts {
     pub fallen: [f64; 2],
     /// Whether pixels are seen through their centres alone.
     pub sees_centres: bool,
+    /// Radiance behind glass that each pixel may lack; of no pixel where nothing is known of it.
+    pub missing: Vec<f64>,
 }
 
 /// The same of a pixel's channels.
@@ -29,8 +31,12 @@ pub(super) struct OfPixel {
     pub noise2: [f64; 3],
     /// The same, over relMSE's denominator.
     pub relative_noise2: [f64; 3],
+    /// What of the squared errors is only that one photon might have come.
+    pub photon2: f64,
     /// Squared bias of the mean of the channels; of noise alone it is 0 on average.
     pub bias2: f64,
+    /// What the pixel has without the light that R brings it beyond doubt, as a part of what it has.
+    pub own: f64,
 }
 
 impl Parts {
@@ -58,6 +64,27 @@ impl Parts {
         self.aliasing2().1
     }
 
+    /// Part of relMSE of light that is missing. The truth has it.
+    pub fn relative_missing2(&self) -> f64 {
+        let of_pixel = |(pixel, missing): (&OfPixel, &f64)| {
+            let of_channel = |value: f64| missing.powi(2) / ((value + missing).powi(2) + self.floor);
+            pixel.values.map(of_channel).iter().sum::<f64>()
+        };
+        self.pixels.iter().zip(&self.missing).map(of_pixel).sum::<f64>() * self.per_sample()
+    }
+
+    /// Part of relMSE of what one photon would have brought pixels that had none, and their share.
+    pub fn without_photons(&self) -> (f64, f64) {
+        let waiting = self.pixels.iter().filter(|pixel| pixel.photon2 > 0.0);
+        let (mut relative2, mut count) = (0.0, 0);
+        for pixel in waiting {
+            let parts = pixel.values.map(|value| pixel.photon2 / (value * value + self.floor));
+            relative2 += parts.iter().sum::<f64>() * self.per_sample();
+            count += 1;
+        }
+        (relative2 * self.fallen[0], f64::from(count) / self.pixels.len() as f64)
+    }
+
     /// Of all parts together, each pixel's squared error.
     pub fn of_pixels(&self) -> Vec<[f64; 3]> {
         // A pixel's own bias is all but lost in noise. What noise made negative is missing: without the scale the picture's
@@ -75,14 +102,16 @@ impl Parts {
             .iter_mut()
             .for_each(|part| *part = part.max(0.0));
         let aliasing_scale = scale(whole, aliasing2.as_flattened().iter().sum());
-        let parts = self.pixels.iter().zip(around).zip(aliasing2);
+        let missing = self.missing.iter().copied().chain(std::iter::repeat(0.0));
+        let parts = self.pixels.iter().zip(around).zip(aliasing2).zip(missing);
         parts
-            .map(|((pixel, bias2), aliasing2)| {
+            .map(|(((pixel, bias2), aliasing2), missing)| {
                 let share2 = share2(&pixel.values);
                 [0, 1, 2].map(|channel| {
                     pixel.noise2[channel] * self.fallen[0]
                         + bias2 * share2[channel] * bias_scale
                         + aliasing2[channel] * aliasing_scale
+                        + missing.powi(2)
                 })
             })
             .collect()
@@ -92,7 +121,9 @@ impl Parts {
     fn relative_of(&self, bias2: &[f64]) -> f64 {
         let of_pixel = |(pixel, bias2): (&OfPixel, &f64)| {
             let shares = share2(&pixel.values).into_iter().zip(pixel.values);
-            let weighed: f64 = shares.map(|(share, value)| share / (value * value + self.floor)).sum();
+            let weighed: f64 = shares
+                .map(|(share, value)| share / ((value * pixel.own).powi(2) + self.floor))
+                .sum();
             bias2 * weighed
         };
         self.pixels.iter().zip(bias2).map(of_pixel).sum::<f64>() * self.per_sample()

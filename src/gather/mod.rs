@@ -4,6 +4,7 @@ mod photons;
 mod points;
 mod primitives;
 
+pub use photons::grid_sizes;
 pub use primitives::{PHOTON_PAIRS, POINT_PAIRS, Pairs, scan, sort};
 
 use crate::config::{CLUSTERED_RUN, GROUP, Sizes};

@@ -1,7 +1,7 @@
 //! Orders of photons, and gathering from them: what is recorded for each batch of photons.
 
 use super::primitives::{PHOTON_PAIRS, scan, sort};
-use crate::config::{CLUSTERED_RUN, EXHAUSTIVE_RANGE, GROUP, RADIUS_GROUPS, RADIUS_STEP, Sizes};
+use crate::config::{CLUSTERED_RUN, EXHAUSTIVE_RANGE, GROUP, Sizes};
 use crate::record::Recording;
 use crate::shaders;
 use crate::stage::{BufferId, Shader, StageDesc};
@@ -108,14 +108,17 @@ impl Exhaustive {
         let photons = sizes.photon_capacity;
         for first in (0..photons).step_by(EXHAUSTIVE_RANGE as usize) {
             let end = first.saturating_add(EXHAUSTIVE_RANGE);
-            let stage = gather_stage(shader, groups * GROUP, sizes).push([first, end, stride, groups, dealing(groups)]);
-            let mut constants = stage.constants.to_vec();
-            constants.extend([
-                ("ORDERED", u32::from(self.ordered)),
-                ("BY_MESH", u32::from(self.by_mesh)),
-                ("DISTANCE", u32::from(self.distance)),
-            ]);
-            recording.dispatch(stage.constants(constants).bind(vec![(BufferId::GatheredFrom, from)]));
+            for map in 0..sizes.photon_maps {
+                let push = [first, end, stride, groups, dealing(groups), map];
+                let stage = gather_stage(shader, groups * GROUP, sizes).push(push);
+                let mut constants = stage.constants.to_vec();
+                constants.extend([
+                    ("ORDERED", u32::from(self.ordered)),
+                    ("BY_MESH", u32::from(self.by_mesh)),
+                    ("DISTANCE", u32::from(self.distance)),
+                ]);
+                recording.dispatch(stage.constants(constants).bind(vec![(BufferId::GatheredFrom, from)]));
+            }
         }
     }
 }
@@ -157,24 +160,30 @@ pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
     recording.dispatch(StageDesc::new(&shaders::OBJECT_CELL_SCATTER, photons));
     let groups = sizes.order_groups();
     for [first, end] in parts(sizes) {
-        let stage = gather_stage(&shaders::GATHER_CLUSTER_GRID, groups * GROUP, sizes);
-        recording.dispatch(stage.push([first, end, groups, dealing(groups)]));
+        for map in 0..sizes.photon_maps {
+            let stage = gather_stage(&shaders::GATHER_CLUSTER_GRID, groups * GROUP, sizes);
+            recording.dispatch(stage.push([first, end, groups, dealing(groups), map]));
+        }
     }
 }
 
-/// The cells of a hashed grid that a few neighbouring visible points reach.
+/// Cell sizes of the hashed grids, from the radii.
+pub fn grid_sizes(sizes: &Sizes, recording: &mut Recording) {
+    recording.fill(BufferId::RadiiOfShells, 0);
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, sizes.receivers()).push(sizes.radius_step()));
+    recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup));
+}
+
+/// The cells of hashed grids that a few neighbouring visible points reach.
 pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
     let photons = sizes.photon_capacity;
-    let radius_threads = RADIUS_GROUPS * shaders::GRID_RADII.workgroup;
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, radius_threads).push([RADIUS_GROUPS, RADIUS_STEP]));
-    recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup).push(RADIUS_GROUPS));
     recording.fill(BufferId::CellStarts, 0);
     recording.dispatch(StageDesc::new(&shaders::GRID_KEYS, photons));
     scan(BufferId::CellStarts, (1 << sizes.cell_bits) + 1, recording);
     let [sorted, _] = sort(BufferId::PhotonCount, photons, sizes.cell_bits, PHOTON_PAIRS, recording);
     let values = vec![(BufferId::ValuesIn, sorted.values)];
     recording.dispatch(StageDesc::new(&shaders::GRID_PHOTONS, photons).bind(values));
-    let runs = sizes.slots().div_ceil(CLUSTERED_RUN);
+    let runs = sizes.receivers().div_ceil(CLUSTERED_RUN);
     for [first, end] in parts(sizes) {
         recording.dispatch(gather_stage(&shaders::GATHER_CLUSTERED, runs, sizes).push([first, end]));
     }

@@ -16,6 +16,8 @@ pub struct Memory {
     pub scene: u64,
     /// For visible points, photons and the rest of a render.
     pub render: u64,
+    /// Of that, what a map of caustic photons takes; 0 where the scene has neither mirrors nor glass.
+    pub caustic_map: u64,
 }
 
 impl Memory {
@@ -31,7 +33,18 @@ impl Memory {
         let recordings = [stages.iteration(0), stages.picture(1, 1)];
         let buffers: BTreeSet<_> = recordings.iter().flat_map(|recording| recording.buffers()).collect();
         let render: u64 = buffers.iter().filter_map(|&id| sizes.bytes(id)).sum();
+        let of_maps = [
+            BufferId::StatisticsOf,
+            BufferId::GatheredOf,
+            BufferId::CoverageOf,
+            BufferId::Radii2,
+        ];
+        let caustic_map = |id: BufferId| {
+            let maps = u64::from(sizes.photon_maps);
+            sizes.bytes(id).unwrap_or_default() / maps * (maps - 1)
+        };
         Self {
+            caustic_map: of_maps.map(caustic_map).iter().sum(),
             scene: scene_buffers(scene).iter().map(|(_, bytes)| bytes.len() as u64).sum(),
             render: render + size_of::<Settings>() as u64,
         }
@@ -56,6 +69,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
         loop_limit: loop_budget(loop_limit),
         lanes: if device.kind == "cpu" { 4096 } else { 1 << 18 },
         splitting: scene.features.dielectric || scene.features.glossy,
+        specular: scene.features.mirror || scene.features.dielectric,
         glossy: scene.features.glossy,
         meshes: scene.object_grids.len() as u32,
         object_cells: scene.object_cells,

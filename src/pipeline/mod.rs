@@ -1,6 +1,8 @@
 //! A render on a Vulkan device. [`Stages::iteration`] has the order of the stages: it reads like figure 1 of the paper.
 
+mod aim;
 mod memory;
+mod radii;
 mod stages;
 
 pub use memory::Memory;
@@ -9,16 +11,14 @@ pub use stages::Stages;
 
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Accel, Limits, Probe, RenderConfig, Sizes};
+use crate::emission::{Aim, is_learned_from};
 use crate::error::{Error, Result};
-use crate::gather::{METHODS, default_method};
+use crate::gather::{METHODS, default_method, grid_sizes};
 use crate::gpu::Device;
-use crate::layout::{
-    GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Photon, Settings, StatusCounters, VisiblePoint,
-};
+use crate::layout::{GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Settings, StatusCounters};
 use crate::record::{Recording, Run};
 use crate::scene::{Camera, PackedScene, SceneFeatures};
-use crate::stage::{BufferId, StageDesc};
-use crate::{radius, shaders};
+use crate::stage::BufferId;
 use stages::{method_stages, reporting};
 
 /// A progressive render on a device.
@@ -29,6 +29,9 @@ pub struct Renderer {
     limits: Limits,
     settings: Settings,
     features: SceneFeatures,
+    /// Median of the initial radii.
+    radius: f32,
+    photon_flux: Option<f64>,
     iterations: u32,
     emitted: u64,
     counters: Counters,
@@ -36,6 +39,8 @@ pub struct Renderer {
     photon_need: [u32; 2],
     /// Whether the photons' buffers fit what photons need.
     fitted: bool,
+    /// Of photon paths, if they are aimed.
+    aim: Option<Aim>,
     /// Launches that a gather outside a render is dealt to, for each of [`METHODS`].
     parts_of_methods: Vec<u32>,
 }
@@ -100,11 +105,14 @@ impl Renderer {
                 lens: scene.features.lens || camera.lens.is_some(),
                 ..scene.features
             },
+            radius: 0.0,
+            photon_flux: None,
             iterations: 0,
             emitted: 0,
             counters: Counters::default(),
             photon_need: [0, 0],
             fitted: false,
+            aim: None,
             parts_of_methods: vec![1; METHODS.len()],
         };
         renderer.upload_settings()?;
@@ -113,7 +121,7 @@ impl Renderer {
         let (iteration, picture) = (stages.iteration(0), stages.picture(1, 1));
         renderer.make_buffers(&iteration)?;
         renderer.make_buffers(&picture)?;
-        renderer.choose_radius()?;
+        renderer.prepare(scene)?;
         Ok(renderer)
     }
 
@@ -197,6 +205,8 @@ impl Renderer {
         let (run, _) = self.run_until_it_fits(|stages| {
             let mut recording = reporting();
             stages.camera(0, &mut recording);
+            stages.radii(&mut recording);
+            stages.demand(0, &mut recording);
             stages.photons(0, 0, &mut recording);
             recording
         })?;
@@ -210,9 +220,13 @@ impl Renderer {
     pub fn picture(&mut self) -> Result<(Run, Resolved)> {
         let recording = self.stages().picture(self.iterations.max(1), self.emitted.max(1));
         let run = self.run(&recording)?;
-        self.counters.non_finite += u64::from(self.status()?.non_finite);
+        let status = self.status()?;
+        self.counters.non_finite += u64::from(status.non_finite);
+        self.counters.photons_accepted =
+            u64::from(status.photons_accepted_low) | u64::from(status.photons_accepted_high) << 32;
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
-        Ok((run, Resolved::from_film(self.config.resolution, &film)))
+        let behind_glass = self.device.download(BufferId::GlassFilm, None)?;
+        Ok((run, Resolved::from_film(self.config.resolution, &film, behind_glass)))
     }
 
     /// Gathers the photons at hand with any method of a device; what was gathered before is forgotten. Returns what it
@@ -229,12 +243,18 @@ impl Renderer {
             recording.fill(BufferId::TestsOf, 0);
             let (order, gather) = method_stages(method);
             order(stages.sizes, &mut recording);
+            grid_sizes(stages.sizes, &mut recording);
             gather(stages.sizes, &mut recording);
             recording
         });
         self.parts_of_methods[method] = self.sizes.gather_parts;
         (self.sizes.gather_parts, self.sizes.probe) = render;
         result
+    }
+
+    /// Whether photons that no visible point wants are dropped.
+    pub fn drops_unwanted(&self) -> bool {
+        self.config.drops_unwanted()
     }
 
     /// The buffers' sizes.
@@ -255,6 +275,7 @@ impl Renderer {
         self.settings.photon_capacity = sizes.photon_capacity;
         self.settings.cell_bits = sizes.cell_bits;
         self.settings.slots_per_pixel = sizes.slots_per_pixel;
+        self.settings.photon_maps = sizes.photon_maps;
         self.device.upload(BufferId::Settings, &[self.settings])
     }
 
@@ -278,59 +299,13 @@ impl Renderer {
         self.make_buffers(recording)?;
         self.device.run(recording)
     }
-
-    /// Takes the user's radius, or finds one from the density of pilot photons: one for the median visible point, then
-    /// smaller ones where the photons are denser. Resets the statistics.
-    fn choose_radius(&mut self) -> Result<()> {
-        if self.config.radius.is_some() {
-            return self.reset();
-        }
-        self.run_until_it_fits(|stages| {
-            let mut recording = reporting();
-            stages.camera(0, &mut recording);
-            let (order, _) = stages.method();
-            order(stages.sizes, &mut recording);
-            stages.photons(radius::PILOT, 0, &mut recording);
-            recording
-        })?;
-        let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
-        let count: Vec<u32> = self.device.download(BufferId::PhotonCount, Some(1))?;
-        let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
-        // The pilot is a batch; the densities of the whole iteration's photons are higher.
-        let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
-        let automatic = radius::automatic(&visible_points, &photons);
-        self.settings.initial_radius2 = automatic.radius2 * share;
-        self.upload_settings()?;
-        self.reset()?;
-        for _ in 0..radius::FITS {
-            self.run_until_it_fits(|stages| {
-                let mut recording = reporting();
-                let (_, gather) = stages.method();
-                gather(stages.sizes, &mut recording);
-                recording
-            })?;
-            let wanted = automatic.photons as f32 * share;
-            let mut recording = Recording::new();
-            recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, self.sizes.slots()).push(wanted));
-            self.run(&recording)?;
-        }
-        self.counters = Counters::default();
-        Ok(())
-    }
-
-    fn reset(&mut self) -> Result<()> {
-        let mut recording = reporting();
-        recording.fill(BufferId::DirectSums, 0);
-        recording.fill(BufferId::CoverageOf, 0);
-        recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.slots()));
-        self.run(&recording).map(|_| ())
-    }
 }
 
 impl Backend for Renderer {
     fn iterate(&mut self) -> Result<Run> {
         self.fit_photon_buffers()?;
         let iteration = self.iterations;
+        self.begin_block(iteration)?;
         let (run, status) = self.run_until_it_fits(|stages| stages.iteration(iteration))?;
         let counters = &mut self.counters;
         counters.photons_stored += u64::from(status.photons_stored_low) | u64::from(status.photons_stored_high) << 32;
@@ -339,6 +314,10 @@ impl Backend for Renderer {
         counters.non_finite += u64::from(status.non_finite);
         counters.lost_photons += u64::from(status.lost_photons);
         counters.full_cells += u64::from(status.full_cells);
+        counters.photons_landed += u64::from(status.photons_landed_low) | u64::from(status.photons_landed_high) << 32;
+        if is_learned_from(&self.config, iteration) {
+            self.learn(iteration, self.sizes.batch_paths)?;
+        }
         self.iterations += 1;
         self.emitted += u64::from(self.config.photons);
         Ok(run)
@@ -361,7 +340,15 @@ impl Backend for Renderer {
     }
 
     fn radius(&self) -> f32 {
-        self.settings.initial_radius2.sqrt()
+        self.radius
+    }
+
+    fn photon_flux(&self) -> Option<f64> {
+        self.photon_flux
+    }
+
+    fn aims(&self) -> bool {
+        self.aim.is_some()
     }
 
     fn device(&self) -> DeviceDescription {

@@ -1,7 +1,9 @@
 //! What an iteration runs, as data.
 
+use std::ops::Range;
+
 use crate::config::{Accel, Direct, Estimator, RenderConfig, Sizes, TriangleTest};
-use crate::gather::{METHODS, Record, default_method, scan};
+use crate::gather::{METHODS, Record, default_method, grid_sizes, scan};
 use crate::record::Recording;
 use crate::scene::SceneFeatures;
 use crate::shaders;
@@ -40,21 +42,26 @@ impl Stages<'_> {
             self.camera(iteration, &mut recording);
             order(self.sizes, &mut recording);
         }
+        self.radii(&mut recording);
+        self.demand(iteration, &mut recording);
         for batch in 0..self.sizes.batches(self.config.photons) {
             self.photons(iteration, batch, &mut recording);
             gather(self.sizes, &mut recording);
         }
         let turn = [iteration, self.config.block_of(iteration)];
-        recording.dispatch(self.ray_stage(&shaders::DIRECT, self.sizes.slots()).push(turn));
+        let mut direct = self.ray_stage(&shaders::DIRECT, self.sizes.slots());
+        let asks = u32::from(self.features.dielectric && self.config.asks_behind_glass(iteration));
+        direct.constants.to_mut().push(("ASKS_BEHIND_GLASS", asks));
+        recording.dispatch(direct.push(turn));
         // The paper has no such correction.
         if self.config.estimator == Estimator::Sppm {
-            recording.dispatch(self.ray_stage(&shaders::COVERAGE, self.sizes.slots()).push([
+            recording.dispatch(self.ray_stage(&shaders::COVERAGE, self.sizes.receivers()).push([
                 turn[0],
                 turn[1],
                 self.config.coverage_points(iteration),
             ]));
         }
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.slots()));
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.receivers()));
         recording
     }
 
@@ -77,21 +84,42 @@ impl Stages<'_> {
         recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(turn));
     }
 
+    /// The radii that the visible points gather within, and the grids that suit them.
+    pub(super) fn radii(&self, recording: &mut Recording) {
+        recording.dispatch(StageDesc::new(&shaders::RADII, self.sizes.receivers()));
+        grid_sizes(self.sizes, recording);
+    }
+
+    /// What visible points want of photons, after so many iterations. The paper keeps all photons.
+    pub(super) fn demand(&self, iterations: u32, recording: &mut Recording) {
+        if self.config.drops_unwanted() {
+            let emitted = u64::from(iterations) * u64::from(self.config.photons);
+            let push = [iterations, (emitted as f32).to_bits()];
+            recording.fill(BufferId::Demand, 0);
+            recording.dispatch(StageDesc::new(&shaders::DEMAND, self.sizes.receivers()).push(push));
+        }
+    }
+
     /// Photon tracing of a batch, and moving its photons together.
     pub(super) fn photons(&self, iteration: u32, batch: u32, recording: &mut Recording) {
         let first = batch * self.sizes.batch_paths;
         let paths = self.sizes.batch_paths.min(self.config.photons - first);
+        self.trace_paths(iteration, first..first + paths, recording);
+        scan(BufferId::LaneOffsets, self.sizes.photon_lanes, recording);
+        recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.lane_photons()));
+    }
+
+    /// Photon tracing alone, of so many paths of an iteration.
+    pub(super) fn trace_paths(&self, iteration: u32, paths: Range<u32>, recording: &mut Recording) {
         let lanes = self.sizes.photon_lanes;
         let block = self.config.block_of(iteration);
         recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([
             iteration,
             block,
             self.config.first_of_block(iteration),
-            first,
-            paths,
+            paths.start,
+            paths.len() as u32,
         ]));
-        scan(BufferId::LaneOffsets, lanes, recording);
-        recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.lane_photons()));
     }
 
     /// A stage that traces rays.
@@ -102,6 +130,8 @@ impl Stages<'_> {
             ("SAMPLER", self.config.sampler as u32),
             ("SLOTS", self.sizes.slots_per_pixel),
             ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
+            ("DROP_UNWANTED", u32::from(self.config.drops_unwanted())),
+            ("AIMED", u32::from(self.sizes.aimed)),
             ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),
         ];
         constants.extend(

@@ -6,11 +6,11 @@ use crate::layout::{
 };
 
 /// [`Material::surface`] of a mirror.
-pub(super) const MIRROR: u32 = 1;
+pub(crate) const MIRROR: u32 = 1;
 /// [`Material::surface`] of a dielectric.
-pub(super) const DIELECTRIC: u32 = 2;
+pub(crate) const DIELECTRIC: u32 = 2;
 /// [`Material::surface`] of what reflects as microfacets do, over a Lambertian base.
-pub(super) const GLOSSY: u32 = 3;
+pub(crate) const GLOSSY: u32 = 3;
 
 /// Declares the features, each with its constant in the kernels.
 macro_rules! features {

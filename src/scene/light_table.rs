@@ -1,12 +1,14 @@
 //! The lights of a scene in the layout of the device, with the probabilities by which they are chosen.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
 use super::punctual::{Emission, PunctualLight};
-use super::{EmissiveTriangle, Scene};
+use super::{EmissiveTriangle, Scene, light_sources};
+use crate::alias::alias_table;
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT, TRIANGLE_LIGHT};
 
 /// The part of all choices of a light that goes to each object that emits, each punctual light and the environment alike
@@ -25,68 +27,75 @@ struct Candidate {
     share: f64,
 }
 
-/// All lights: triangles in leaf order, punctual ones, the environment; with the alias table. And what they emit together,
-/// mean of RGB.
-pub(super) fn lights(scene: &Scene, order: &[u32]) -> (Vec<Light>, f64) {
-    let mut candidates = emissive_triangles(scene, order);
-    let others = scene
-        .lights
-        .iter()
-        .map(|light| punctual(scene, light))
-        .chain(environment(scene));
-    candidates.extend(others.map(|(light, power)| Candidate {
+/// All lights of a scene.
+pub(super) struct Lights {
+    /// Triangles by object and in leaf order, punctual ones, the environment; with the alias table.
+    pub lights: Vec<Light>,
+    /// Ranges of them.
+    pub sources: Vec<Range<u32>>,
+    /// What they emit together, mean of RGB.
+    pub power: f64,
+}
+
+/// The lights, where triangles lie in this order.
+pub(super) fn lights(scene: &Scene, order: &[u32]) -> Lights {
+    let (mut candidates, mut sources) = emissive_triangles(scene, order);
+    let triangles = candidates.len() as u32;
+    let punctual_lights = scene.lights.iter().map(|light| punctual(scene, light));
+    let mut others: Vec<(Light, f64)> = punctual_lights.chain(environment(scene)).collect();
+    // Those of a kind lie together, so that they can be bundled. The environment stays the last one.
+    others.sort_by_key(|(light, _)| light.kind);
+    candidates.extend(others.into_iter().map(|(light, power)| Candidate {
         light,
         power,
         share: 1.0,
     }));
+    sources.extend((triangles..candidates.len() as u32).map(|light| light..light + 1));
     let power: f64 = candidates.iter().map(|candidate| candidate.power).sum();
     let shares: f64 = candidates.iter().map(|candidate| candidate.share).sum();
     let probabilities: Vec<f64> = candidates
         .iter()
         .map(|candidate| (1.0 - ALIKE) * candidate.power / power + ALIKE * candidate.share / shares)
         .collect();
+    let powers: Vec<f64> = candidates.iter().map(|candidate| candidate.power).collect();
     let mut lights: Vec<Light> = candidates.into_iter().map(|candidate| candidate.light).collect();
     set_alias_table(&mut lights, &probabilities);
-    (lights, power)
+    let sources = light_sources::bundled(&lights, sources);
+    for source in &sources {
+        let within = source.start as usize..source.end as usize;
+        light_sources::set_cumulative(&mut lights[within.clone()], &powers[within]);
+    }
+    Lights { lights, sources, power }
 }
 
-/// Gives lights the probabilities, whose sum is 1, by which they are to be chosen: Vose, «A Linear Algorithm For Generating
-/// Random Numbers With a Given Distribution», IEEE Transactions on Software Engineering 17(9), 1991.
+/// Gives lights the probabilities, whose sum is 1, by which they are to be chosen.
 pub(crate) fn set_alias_table(lights: &mut [Light], probabilities: &[f64]) {
-    let count = probabilities.len() as f64;
-    // How much of each light is left to be put into cells, whose width is 1.
-    let mut left: Vec<f64> = probabilities.iter().map(|probability| probability * count).collect();
-    for (i, (light, &probability)) in lights.iter_mut().zip(probabilities).enumerate() {
+    for ((light, &probability), cell) in lights.iter_mut().zip(probabilities).zip(alias_table(probabilities)) {
         light.probability = probability as f32;
-        light.accept = 1.0;
-        light.alias = i as u32;
-    }
-    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..left.len()).partition(|&i| left[i] < 1.0);
-    // What rounding leaves over fills its own cell.
-    while let (Some(&donor), Some(cell)) = (large.last(), small.pop()) {
-        lights[cell].accept = left[cell] as f32;
-        lights[cell].alias = donor as u32;
-        left[donor] -= 1.0 - left[cell];
-        if left[donor] < 1.0 {
-            large.pop();
-            small.push(donor);
-        }
+        light.accept = cell.accept;
+        light.alias = cell.alias;
     }
 }
 
-fn emissive_triangles(scene: &Scene, order: &[u32]) -> Vec<Candidate> {
+/// And the range of each object's.
+fn emissive_triangles(scene: &Scene, order: &[u32]) -> (Vec<Candidate>, Vec<Range<u32>>) {
     let mut place = vec![0; scene.triangles.len()];
     for (packed, &index) in order.iter().enumerate() {
         place[index as usize] = packed as u32;
     }
     let mut emissive = scene.emissive_triangles();
-    emissive.sort_by_key(|light| place[light.triangle as usize]);
     let object_of = |light: &EmissiveTriangle| scene.triangles[light.triangle as usize].object as usize;
+    emissive.sort_by_key(|light| (object_of(light), place[light.triangle as usize]));
     let mut power_of_objects = vec![0.0; scene.objects.len()];
     for light in &emissive {
         power_of_objects[object_of(light)] += light.power;
     }
-    emissive
+    let mut sources = Vec::new();
+    for lights in emissive.chunk_by(|a, b| object_of(a) == object_of(b)) {
+        let first = sources.last().map_or(0, |source: &Range<u32>| source.end);
+        sources.push(first..first + lights.len() as u32);
+    }
+    let candidates = emissive
         .iter()
         .map(|emissive| Candidate {
             light: Light {
@@ -98,7 +107,8 @@ fn emissive_triangles(scene: &Scene, order: &[u32]) -> Vec<Candidate> {
             power: emissive.power,
             share: emissive.power / power_of_objects[object_of(emissive)],
         })
-        .collect()
+        .collect();
+    (candidates, sources)
 }
 
 /// A light, and its power.

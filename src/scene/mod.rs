@@ -25,6 +25,7 @@ mod graph;
 mod image;
 mod instance;
 mod light;
+mod light_sources;
 mod light_table;
 mod load;
 mod material;
@@ -41,6 +42,8 @@ mod tangents;
 mod texture;
 
 pub use features::SceneFeatures;
+pub(crate) use features::{DIELECTRIC, GLOSSY, MIRROR};
+pub use light_sources::MOST_SOURCES;
 #[cfg(test)]
 pub(crate) use light_table::set_alias_table;
 pub use load::LoadOptions;

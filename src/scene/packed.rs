@@ -43,6 +43,9 @@ pub struct PackedScene {
     pub features: SceneFeatures,
     /// Lights.
     pub lights: Vec<Light>,
+    /// Ranges of [`PackedScene::lights`] that photon paths are aimed from: an object's triangles, another light, or several
+    /// neighbours of such. [`super::MOST_SOURCES`] at the most.
+    pub sources: Vec<Range<u32>>,
     /// What they emit together, mean of RGB.
     pub power: f64,
     /// Radiance from afar, and how directions are chosen from it.
@@ -72,7 +75,7 @@ impl PackedScene {
         } = shared_triangles(scene);
         let bvh = bvh::build(scene, &ranges, &placed)?;
         let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| scene.corners_of(index)).collect();
-        let (lights, power) = light_table::lights(scene, &bvh.order);
+        let light_table::Lights { lights, sources, power } = light_table::lights(scene, &bvh.order);
         let own_triangles = bvh.shared.first().map_or(bvh.order.len() as u32, |shared| shared.start);
         let own = bvh.order[..own_triangles as usize].iter().map(|&index| {
             let object = scene.triangles[index as usize].object;
@@ -130,6 +133,7 @@ impl PackedScene {
             bsdf_sampling: bsdf_sampling(scene, &lights),
             materials,
             lights,
+            sources,
             environment: scene
                 .environment
                 .as_ref()

@@ -6,9 +6,10 @@ use glam::{DVec3, Vec3};
 use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
+use ppm_vk::emission::Aim;
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
-use ppm_vk::layout::{NO_OBJECT, Photon, Settings, VisiblePoint};
+use ppm_vk::layout::{CAUSTIC, NO_OBJECT, Photon, Settings, VisiblePoint};
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::scene::{Emission, Environment, PackedScene, PunctualLight, Scene};
 use ppm_vk::stage::BufferId;
@@ -81,6 +82,8 @@ pub struct Bench {
     pub config: RenderConfig,
     pub settings: Settings,
     pub renderer: Renderer,
+    /// What visible points wanted of the iteration's photons.
+    pub demand: Option<cpu::Demand>,
 }
 
 impl Bench {
@@ -97,11 +100,16 @@ impl Bench {
         let mut renderer = Renderer::new(device, &scene, &loaded.cameras[0], config.clone()).expect("a renderer");
         renderer.iterate().expect("an iteration");
         let settings = download(&mut renderer, BufferId::Settings)[0];
+        let demand = renderer.drops_unwanted().then(|| cpu::Demand {
+            entries: download(&mut renderer, BufferId::Demand),
+            grid: download(&mut renderer, BufferId::Grid)[0],
+        });
         Self {
             scene,
             config,
             settings,
             renderer,
+            demand,
         }
     }
 
@@ -111,6 +119,8 @@ impl Bench {
             scene: &self.scene,
             settings: &self.settings,
             config: &self.config,
+            demand: self.demand.as_ref(),
+            emission: self.renderer.aim().map(Aim::table),
         }
     }
 
@@ -123,6 +133,7 @@ impl Bench {
             } else {
                 Vec::new()
             },
+            footprints: self.download(BufferId::Footprints),
         }
     }
 
@@ -173,7 +184,7 @@ pub fn xyz(v: [f32; 4]) -> DVec3 {
 /// The object of a visible point or a photon, `None` for a visible point on no matte surface.
 pub fn object(position_object: [f32; 4]) -> Option<u32> {
     let object = position_object[3].to_bits();
-    (object != NO_OBJECT).then_some(object)
+    (object != NO_OBJECT).then_some(object & !CAUSTIC)
 }
 
 /// A visible point of albedo π on an object, seen from +z.

@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
-use ppm_vk::layout::{Coverage, Statistics, VisiblePoint};
+use ppm_vk::layout::{Coverage, Gathered, Statistics, VisiblePoint};
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
@@ -12,8 +12,9 @@ use super::agreement::Agreement;
 use super::bench::{Bench, small, visible_point};
 
 /// What the first iteration of the stage finds at these points with these radii.
-fn on_device(bench: &mut Bench, points: &[VisiblePoint], statistics: &[Statistics]) -> Vec<Coverage> {
+fn on_device(bench: &mut Bench, points: &[VisiblePoint], radii2: &[f32], statistics: &[Statistics]) -> Vec<Coverage> {
     bench.upload(BufferId::VisiblePoints, points);
+    bench.upload(BufferId::Radii2, radii2);
     bench.upload(BufferId::StatisticsOf, statistics);
     let mut recording = Recording::new();
     recording.fill(BufferId::Status, 0);
@@ -24,7 +25,7 @@ fn on_device(bench: &mut Bench, points: &[VisiblePoint], statistics: &[Statistic
     ];
     let push = [0, 0, bench.config.coverage_points(0)];
     recording.dispatch(
-        StageDesc::new(&shaders::COVERAGE, points.len() as u32)
+        StageDesc::new(&shaders::COVERAGE, radii2.len() as u32)
             .constants(constants)
             .push(push),
     );
@@ -41,10 +42,16 @@ fn points_can_have_photons_where_the_cpu_says_so() {
         };
         let mut bench = Bench::new(name, config);
         let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
-        let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
-        let found = on_device(&mut bench, &points, &statistics);
-        let mut expected = vec![Coverage::zeroed(); points.len()];
-        cpu::coverage(&bench.inputs(), 0, &points, &statistics, &mut expected);
+        let mut statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+        let radii2: Vec<f32> = bench.download(BufferId::Radii2);
+        // Those without photons look around.
+        for statistics in statistics.iter_mut().step_by(2) {
+            (statistics.accepted_low, statistics.accepted_high) = (0, 0);
+        }
+        let found = on_device(&mut bench, &points, &radii2, &statistics);
+        let mut expected = vec![Coverage::zeroed(); radii2.len()];
+        let photons = (statistics.as_slice(), &vec![Gathered::zeroed(); radii2.len()][..]);
+        cpu::coverage(&bench.inputs(), 0, &points, &radii2, photons, &mut expected);
         let mut agreement = Agreement::default();
         for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
             assert_eq!(found.asked, expected.asked, "{name}, slot {slot}: asked");
@@ -54,6 +61,8 @@ fn points_can_have_photons_where_the_cpu_says_so() {
         }
         // A point next to an edge lies on either side by rounding.
         agreement.assert(&format!("coverage in {name}"), 0.99, 2000);
+        let surrounded = expected.iter().filter(|coverage| coverage.surrounded > 0).count();
+        assert!(surrounded > 500, "{name}: only {surrounded} points are surrounded");
         let partly = expected
             .iter()
             .filter(|coverage| coverage.covered < coverage.asked)
@@ -90,8 +99,13 @@ fn discs_that_reach_past_a_wall_are_covered_by_their_part_before_it() {
     for distance in [0.0, 0.3, 0.8, 1.2] {
         let point = visible_point([low[0] + distance * radius, 0.0, low[2]], object);
         let count = bench.renderer.sizes().slots() as usize;
-        let (points, statistics) = (vec![point; count], vec![cpu::reset(radius * radius); count]);
-        let found = on_device(&mut bench, &points, &statistics);
+        // As many discs as can have had photons.
+        let lit = Statistics {
+            accepted_low: 1,
+            ..cpu::reset(radius * radius)
+        };
+        let (points, radii2) = (vec![point; count], vec![radius * radius; count]);
+        let found = on_device(&mut bench, &points, &radii2, &vec![lit; count]);
         let covered: u32 = found.iter().map(|coverage| coverage.covered).sum();
         let share = f64::from(covered) / (16 * count) as f64;
         // A segment of the disc lies past the wall.

@@ -14,9 +14,14 @@ use ppm_vk::stage::{BufferId, StageDesc};
 use super::agreement::relative_difference;
 use super::bench::{Bench, photon, random_numbers, small, visible_point, xyz};
 
-/// Radii for all visible points.
-fn with_radius(count: usize, radius2: f32) -> Vec<Statistics> {
-    vec![cpu::reset(radius2); count]
+/// Statistics with a radius for all visible points, in each photon map.
+fn with_radius(bench: &Bench, radius2: f32) -> Vec<Statistics> {
+    vec![cpu::reset(radius2); bench.renderer.sizes().receivers() as usize]
+}
+
+/// R² of each.
+fn radii2(statistics: &[Statistics]) -> Vec<f32> {
+    statistics.iter().map(|statistics| statistics.radius2_high).collect()
 }
 
 /// M of each slot.
@@ -37,7 +42,13 @@ fn assert_methods_agree(
 ) -> Vec<u32> {
     let gloss = Vec::new();
     let points = points.to_vec();
-    assert_methods_agree_on(bench, case, &Seen { points, gloss }, statistics, photons)
+    let footprints = Vec::new();
+    let seen = Seen {
+        points,
+        gloss,
+        footprints,
+    };
+    assert_methods_agree_on(bench, case, &seen, statistics, photons)
 }
 
 fn assert_methods_agree_on(
@@ -57,11 +68,13 @@ fn assert_methods_agree_on(
         photons.len() <= bench.renderer.sizes().photon_capacity as usize,
         "more photons than the buffers hold"
     );
-    let mut expected = vec![Gathered::zeroed(); points.len()];
-    cpu::gather_naive(seen, statistics, photons, &mut expected);
+    let radii2 = radii2(statistics);
+    let mut expected = vec![Gathered::zeroed(); radii2.len()];
+    cpu::gather_naive(seen, &radii2, photons, &mut expected);
     let mut updated = statistics.to_vec();
     cpu::update(
         points,
+        &radii2,
         bench.config.alpha,
         &Counts::default(),
         &mut expected.clone(),
@@ -80,6 +93,7 @@ fn assert_methods_agree_on(
         }
         let what = format!("{case}, {}", method.name);
         bench.upload(BufferId::StatisticsOf, statistics);
+        bench.upload(BufferId::Radii2, &radii2);
         bench
             .renderer
             .gather(index, Probe::default())
@@ -89,7 +103,7 @@ fn assert_methods_agree_on(
 
         let mut recording = Recording::new();
         recording.fill(BufferId::Status, 0);
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, points.len() as u32));
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, radii2.len() as u32));
         bench
             .renderer
             .run(&recording)
@@ -201,7 +215,7 @@ fn more_than_ten_thousand_meshes_some_without_photons_or_visible_points_are_told
     let photons: Vec<Photon> = random_numbers(10_001)
         .map(|[u, x, y, r]| photon([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], mesh(u) & !1, [r, 1.0, 0.5]))
         .collect();
-    let statistics = with_radius(points.len(), 1.0);
+    let statistics = with_radius(&bench, 1.0);
     let m = assert_methods_agree(&mut bench, "10,007 meshes", &points, &statistics, &photons);
     assert!(m.contains(&0) && m.contains(&1), "some find none, some find one");
 }
@@ -210,10 +224,10 @@ fn more_than_ten_thousand_meshes_some_without_photons_or_visible_points_are_told
 fn all_methods_agree_on_traced_photons_at_any_radius() {
     let mut bench = Bench::new("cornell-spheres", small());
     let (points, photons): (Vec<VisiblePoint>, _) = (bench.download(BufferId::VisiblePoints), bench.photons());
-    let radius2 = bench.settings.initial_radius2;
+    let radius2 = bench.renderer.radius().powi(2);
     let mut means = Vec::new();
     for factor in [0.25f32, 1.0, 4.0] {
-        let statistics = with_radius(points.len(), radius2 * factor * factor);
+        let statistics = with_radius(&bench, radius2 * factor * factor);
         let case = format!("{} photons, {factor} times the automatic radius", photons.len());
         let m = assert_methods_agree(&mut bench, &case, &points, &statistics, &photons);
         means.push(m.iter().map(|&m| f64::from(m)).sum::<f64>() / m.len() as f64);
@@ -228,7 +242,7 @@ fn all_methods_agree_on_traced_photons_at_any_radius() {
 fn all_methods_agree_on_what_glossy_surfaces_scatter_to_the_viewer() {
     let mut bench = Bench::new("glossy", small());
     let (seen, photons) = (bench.seen(), bench.photons());
-    let statistics = with_radius(seen.points.len(), bench.settings.initial_radius2);
+    let statistics = with_radius(&bench, bench.renderer.radius().powi(2));
     assert_methods_agree_on(&mut bench, "glossy surfaces", &seen, &statistics, &photons);
 }
 
@@ -236,8 +250,8 @@ fn all_methods_agree_on_what_glossy_surfaces_scatter_to_the_viewer() {
 fn all_methods_agree_where_radii_differ() {
     let mut bench = Bench::new("cornell-spheres", small());
     let (points, photons): (Vec<VisiblePoint>, _) = (bench.download(BufferId::VisiblePoints), bench.photons());
-    let radius = bench.settings.initial_radius2.sqrt();
-    let statistics: Vec<Statistics> = random_numbers(points.len() as u32)
+    let radius = bench.renderer.radius();
+    let statistics: Vec<Statistics> = random_numbers(bench.renderer.sizes().receivers())
         .map(|[u, ..]| cpu::reset((radius * 4f32.powf(2.0 * u - 1.0)).powi(2)))
         .collect();
     assert_methods_agree(
@@ -271,7 +285,7 @@ fn plane(bench: &Bench) -> Vec<VisiblePoint> {
 fn no_photon_and_one_photon_are_gathered() {
     let mut bench = Bench::new("cornell", tiny());
     let points = plane(&bench);
-    let statistics = with_radius(points.len(), 0.25);
+    let statistics = with_radius(&bench, 0.25);
     let m = assert_methods_agree(&mut bench, "no photon", &points, &statistics, &[]);
     assert!(m.iter().all(|&m| m == 0));
     let photons = [photon([0.1, 0.2, 0.0], 0, [1.0, 2.0, 3.0])];
@@ -305,7 +319,7 @@ fn a_photon_at_distance_r_counts_and_the_next_one_beyond_does_not() {
         let beyond = radius + 1.0 / 1_048_576.0;
         photons.extend([x + beyond, x - beyond].map(|farther| photon([farther, y, z], slot, flux)));
     }
-    let statistics = with_radius(points.len(), radius * radius);
+    let statistics = with_radius(&bench, radius * radius);
     let m = assert_methods_agree(&mut bench, "photons at distance R", &points, &statistics, &photons);
     assert_eq!(m, vec![5; 64], "five photons lie at R, two just beyond");
 }
@@ -314,7 +328,7 @@ fn a_photon_at_distance_r_counts_and_the_next_one_beyond_does_not() {
 fn photons_of_another_object_or_from_behind_do_not_count() {
     let mut bench = Bench::new("cornell", tiny());
     let points = plane(&bench);
-    let statistics = with_radius(points.len(), 9.0);
+    let statistics = with_radius(&bench, 9.0);
     let from_behind = |mut photon: Photon| {
         photon.flux_direction[3] = f32::from_bits(cpu::encode_direction(glam::DVec3::Z));
         photon
@@ -333,7 +347,7 @@ fn photons_that_lie_in_one_cell_are_all_found() {
     let photons: Vec<Photon> = random_numbers(4099)
         .map(|[x, y, r, g]| photon([0.3 + 1e-4 * x, -0.2 + 1e-4 * y, 0.0], 0, [r, g, 1.0]))
         .collect();
-    let statistics = with_radius(points.len(), 0.16);
+    let statistics = with_radius(&bench, 0.16);
     let m = assert_methods_agree(&mut bench, "photons in one cell", &points, &statistics, &photons);
     assert!(m.contains(&0) && m.contains(&4099), "{m:?}");
 }
@@ -347,7 +361,7 @@ fn more_photons_than_a_loop_may_test_are_all_tested() {
     let photons: Vec<Photon> = random_numbers(70_001)
         .map(|[x, y, r, g]| photon([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], 0, [r, g, 0.5]))
         .collect();
-    let statistics = with_radius(points.len(), 9.0);
+    let statistics = with_radius(&bench, 9.0);
     let m = assert_methods_agree(&mut bench, "70,001 photons within R", &points, &statistics, &photons);
     assert_eq!(m, vec![70_001; 64]);
 }
@@ -368,7 +382,7 @@ fn photons_beyond_a_cells_maximum_are_lost_and_counted() {
     bench.upload(BufferId::VisiblePoints, &points);
     bench.upload(BufferId::Photons, &photons);
     bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);
-    bench.upload(BufferId::StatisticsOf, &with_radius(points.len(), 9.0));
+    bench.upload(BufferId::Radii2, &radii2(&with_radius(&bench, 9.0)));
     let method = gather::method("cluster-grid").expect("cluster-grid");
     let (_, status) = bench.renderer.gather(method, Probe::default()).expect("a gather");
     assert_eq!((status.lost_photons, status.full_cells), (900, 1));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Accel, RenderConfig, TriangleTest};
+use ppm_vk::config::{Accel, EmissionChoice, RenderConfig, TriangleTest};
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
@@ -117,9 +117,11 @@ fn rays_meet_instances_as_they_meet_meshes_of_their_own() {
         let config = RenderConfig { accel, ..small() };
         let settings: Settings = bytemuck::Zeroable::zeroed();
         let inputs = cpu::Inputs {
+            demand: None,
             scene: &scene,
             settings: &settings,
             config: &config,
+            emission: None,
         };
         let found = rays.iter().map(|[origin, direction]| {
             let ray = cpu::Ray {
@@ -186,6 +188,7 @@ fn picture(scene: &Scene, packed: &PackedScene, iterations: u32) -> Image {
         resolution: [64, 63],
         photons: 20_000,
         radius: Some(0.03),
+        emission: EmissionChoice::Power,
         ..RenderConfig::default()
     };
     let device = Device::open(None).expect("a Vulkan device");

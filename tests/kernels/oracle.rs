@@ -17,6 +17,8 @@ fn inputs<'a>(scene: &'a PackedScene, settings: &'a Settings, config: &'a Render
         scene,
         settings,
         config,
+        demand: None,
+        emission: None,
     }
 }
 
@@ -97,13 +99,13 @@ fn the_kd_tree_finds_what_testing_every_photon_finds() {
         first_path: 0,
         paths: config.photons,
     };
-    let photons = cpu::compact(&cpu::photons(&inputs, batch, &counts));
+    let photons = cpu::compact(&cpu::photons(&inputs, batch, &counts).lanes);
     for radius in [0.2, 1.0, 5.0] {
-        let statistics = vec![cpu::reset((radius * renderer.radius()).powi(2)); points.len()];
-        let nothing = vec![Gathered::zeroed(); points.len()];
+        let radii2 = vec![(radius * renderer.radius()).powi(2); 2 * points.len()];
+        let nothing = vec![Gathered::zeroed(); radii2.len()];
         let (mut found, mut expected) = (nothing.clone(), nothing);
-        cpu::gather_kd_tree(&points, &statistics, &photons, &mut found).expect("few photons");
-        cpu::gather_naive(&points, &statistics, &photons, &mut expected);
+        cpu::gather_kd_tree(&points, &radii2, &photons, &mut found).expect("few photons");
+        cpu::gather_naive(&points, &radii2, &photons, &mut expected);
         let differing = found
             .iter()
             .zip(&expected)

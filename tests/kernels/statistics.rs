@@ -2,15 +2,18 @@
 
 use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Estimator, RADIUS_GROUPS, RenderConfig};
+use ppm_vk::config::{Estimator, RenderConfig};
 use ppm_vk::cpu::{self, Counts};
 use ppm_vk::gather::METHODS;
-use ppm_vk::layout::{Coverage, DirectSum, Gathered, NO_OBJECT, Photon, RadiusSum, Statistics, VisiblePoint};
+use ppm_vk::layout::{
+    BehindGlass, Coverage, DirectSum, Gathered, GridShape, NO_OBJECT, Photon, Settings, ShellRadii, Statistics,
+    VisiblePoint,
+};
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
-use super::agreement::relative_difference;
+use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, photon, random_numbers, small, visible_point};
 
 /// Values of 1e-6 relative: the device keeps two f32 of each, 48 bits, but rounds the factors of eq. 2 to f32.
@@ -67,6 +70,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     recording.fill(BufferId::GatheredOf, 0);
     let (_, naive) = METHODS[0].stages().expect("a method of devices");
     for _ in 0..500 {
+        recording.dispatch(StageDesc::new(&shaders::RADII, 64));
         naive(bench.renderer.sizes(), &mut recording);
         recording.dispatch(StageDesc::new(&shaders::UPDATE, 64));
     }
@@ -79,9 +83,11 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     let mut expected = statistics;
     let mut gathered = vec![Gathered::zeroed(); 64];
     for _ in 0..ITERATIONS {
-        cpu::gather_naive(&points, &before, &photons, &mut gathered);
+        let radii2: Vec<f32> = expected.iter().map(|s: &Statistics| s.radius2_high).collect();
+        cpu::gather_naive(&points, &radii2, &photons, &mut gathered);
         cpu::update(
             &points,
+            &radii2,
             bench.config.alpha,
             &Counts::default(),
             &mut gathered,
@@ -125,74 +131,158 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
 }
 
 #[test]
-fn radii_shrink_where_more_photons_than_wanted_were_found() {
-    let mut bench = Bench::new("cornell", tiny());
-    let wanted = 7.5f32;
-    let gathered: Vec<Gathered> = (0..64)
-        .map(|slot| Gathered {
-            flux_count: [1.0, 2.0, 3.0, f32::from_bits(slot * slot)],
+fn radii_shrink_where_more_photons_than_wanted_were_found_but_not_below_a_part_of_a_footprint() {
+    let mut bench = Bench::new("cornell-spheres", tiny());
+    let receivers = bench.renderer.sizes().receivers();
+    assert_eq!(receivers, 128, "64 slots, two photon maps");
+    let (wanted, least) = ([7.5f32, 20.0], 0.5f32);
+    let gathered: Vec<Gathered> = (0..receivers)
+        .map(|i| Gathered {
+            flux_count: [1.0, 2.0, 3.0, f32::from_bits(i * i)],
             moment: 0.5,
             ..Gathered::zeroed()
         })
         .collect();
-    let statistics: Vec<Statistics> = random_numbers(64).map(|[u, ..]| cpu::reset(0.01 + u)).collect();
-    bench.upload(BufferId::VisiblePoints, &[visible_point([0.0; 3], 0); 64]);
+    let numbers: Vec<[f32; 4]> = random_numbers(receivers).collect();
+    let statistics: Vec<Statistics> = numbers.iter().map(|[u, ..]| cpu::reset(0.01 + u)).collect();
+    let footprints: Vec<f32> = numbers[..64].iter().map(|[_, v, ..]| 0.1 * v).collect();
     bench.upload(BufferId::GatheredOf, &gathered);
     bench.upload(BufferId::StatisticsOf, &statistics);
+    bench.upload(BufferId::Footprints, &footprints);
     let mut recording = Recording::new();
-    recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, 64).push(wanted));
+    let push = [wanted[0], wanted[1], least];
+    recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, receivers).push(push));
     bench.renderer.run(&recording).expect("a run");
 
     let mut expected = statistics.clone();
-    cpu::fit_radius(wanted, &mut gathered.clone(), &mut expected);
+    cpu::fit_radius(wanted, least, &footprints, &mut gathered.clone(), &mut expected);
     let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
-    for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
+    for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
         let difference = relative_difference(radius2(found), radius2(expected));
         assert!(
             difference < TOLERANCE,
-            "slot {slot}: R² {}, {} on the CPU",
+            "receiver {i}: R² {}, {} on the CPU",
             radius2(found),
             radius2(expected)
         );
-        let by_hand = f64::from(statistics[slot].radius2_high) * (7.5 / (slot * slot) as f64).min(1.0);
+        let before = radius2(&statistics[i]);
+        let shrunk = before * (f64::from(wanted[i / 64]) / (i * i) as f64).min(1.0);
+        let by_hand = shrunk.max(before.min((0.5 * f64::from(footprints[i % 64])).powi(2)));
         let difference = relative_difference(radius2(found), by_hand);
         assert!(
             difference < TOLERANCE,
-            "slot {slot}: R² {}, {by_hand} by hand",
+            "receiver {i}: R² {}, {by_hand} by hand",
             radius2(found)
         );
     }
-    for (slot, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
-        assert_eq!(*gathered, Gathered::zeroed(), "slot {slot}");
+    for (i, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
+        assert_eq!(*gathered, Gathered::zeroed(), "receiver {i}");
     }
 }
 
 #[test]
-fn radii_are_summed_up_and_updates_clear_what_was_gathered() {
+fn discs_follow_footprints_and_are_counted_in_their_shells() {
+    // Radii found automatically have bounds.
     let mut bench = Bench::new("cornell-spheres", small());
-    let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
-    let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+    let seen = bench.seen();
+    let receivers = bench.renderer.sizes().receivers();
+    // Some slots see something for the first time, some have discs that are too large here.
+    let statistics: Vec<Statistics> = random_numbers(receivers)
+        .map(|[u, v, ..]| cpu::reset(if u < 0.3 { 0.0 } else { 0.1 * v * v }))
+        .collect();
+    bench.upload(BufferId::StatisticsOf, &statistics);
+    let step = bench.renderer.sizes().radius_step();
     let mut recording = Recording::new();
-    let threads = RADIUS_GROUPS * shaders::GRID_RADII.workgroup;
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, threads).push([RADIUS_GROUPS, 3]));
+    recording.dispatch(StageDesc::new(&shaders::RADII, receivers));
+    recording.fill(BufferId::RadiiOfShells, 0);
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, receivers).push(step));
+    recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup));
     bench.renderer.run(&recording).expect("radii");
-    let found: Vec<RadiusSum> = bench.download(BufferId::RadiusSums);
-    let size = shaders::GRID_RADII.workgroup as usize;
-    let expected = cpu::radius_sums(&points, &statistics, [RADIUS_GROUPS as usize, size, 3]);
-    assert_eq!(found.len(), expected.len());
-    for (group, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        assert_eq!(found.count, expected.count, "group {group}");
-        for (what, found, expected) in [
-            ("ΣR²", found.radius2, expected.radius2),
-            ("Σ1/R²", found.inverse2, expected.inverse2),
-        ] {
-            let difference = relative_difference(found.into(), expected.into());
-            assert!(
-                difference < 1e-6,
-                "group {group}: {what} {found} on the device, {expected} on the CPU"
-            );
-        }
+
+    let mut expected_statistics = statistics;
+    let expected = cpu::radii(&bench.settings, &seen, &mut expected_statistics);
+    let found: Vec<f32> = bench.download(BufferId::Radii2);
+    for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        let difference = relative_difference((*found).into(), (*expected).into());
+        assert!(difference < 1e-6, "receiver {i}: R² {found}, {expected} on the CPU");
     }
+    let set: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+    for (i, (found, expected)) in set.iter().zip(&expected_statistics).enumerate() {
+        let difference = relative_difference(radius2(found), radius2(expected));
+        assert!(difference < 1e-6, "receiver {i}: {found:?}, {expected:?} on the CPU");
+    }
+    let expected = cpu::shell_radii(&bench.settings, &seen.points, &found, step);
+    let found: Vec<ShellRadii> = bench.download(BufferId::RadiiOfShells);
+    let grid: Vec<GridShape> = bench.download(BufferId::Grid);
+    let shape = cpu::grid_shape(&found);
+    let mut shells = 0;
+    for (shell, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        assert_eq!(
+            (found.count, found.largest),
+            (expected.count, expected.largest),
+            "shell {shell}"
+        );
+        // A step of rounding each.
+        assert!(
+            found.logs.abs_diff(expected.logs) <= found.count,
+            "shell {shell}: {found:?}, {expected:?}"
+        );
+        shells += u32::from(found.count > 0);
+        let (found, expected) = (grid[0].inverse_cell_size[shell], shape.inverse_cell_size[shell]);
+        let difference = relative_difference(found.into(), expected.into());
+        assert!(difference < 1e-5, "shell {shell}: 1/s {found}, {expected} on the CPU");
+    }
+    assert!(shells >= 2, "one for each photon map at the least: {found:?}");
+}
+
+#[test]
+fn what_visible_points_want_of_photons_is_what_the_cpu_says() {
+    for name in ["cornell-spheres", "glossy", "pool"] {
+        let mut bench = Bench::new(name, small());
+        for _ in 0..3 {
+            bench.renderer.iterate().expect("an iteration");
+        }
+        // The buffers hold the state after the iteration, the table that before it.
+        let (iterations, emitted) = (bench.renderer.iterations(), bench.renderer.emitted());
+        let receivers = bench.renderer.sizes().receivers();
+        let mut recording = Recording::new();
+        recording.fill(BufferId::Demand, 0);
+        let push = [iterations, (emitted as f32).to_bits()];
+        recording.dispatch(StageDesc::new(&shaders::DEMAND, receivers).push(push));
+        bench.renderer.run(&recording).expect("demand");
+        let found: Vec<f32> = bench.download(BufferId::Demand);
+        let settings: Vec<Settings> = bench.download(BufferId::Settings);
+        let (statistics, coverage) = (
+            bench.download(BufferId::StatisticsOf),
+            bench.download(BufferId::CoverageOf),
+        );
+        let direct_sums = bench.download(BufferId::DirectSums);
+        let progress = cpu::Progress {
+            statistics: &statistics,
+            coverage: &coverage,
+            direct_sums: &direct_sums,
+            iterations,
+            emitted,
+        };
+        let (seen, radii2) = (bench.seen(), bench.download::<f32>(BufferId::Radii2));
+        let grid = bench.download::<GridShape>(BufferId::Grid)[0];
+        let expected = cpu::demand(&settings[0], &seen, &radii2, progress, grid);
+        let mut agreement = Agreement::default();
+        for (entry, (found, expected)) in found.iter().zip(&expected.entries).enumerate() {
+            if *found > 0.0 || *expected > 0.0 {
+                let difference = relative_difference((*found).into(), (*expected).into());
+                agreement.note(difference < 1e-3, || {
+                    format!("entry {entry}: {found} on the device, {expected} on the CPU")
+                });
+            }
+        }
+        agreement.assert(&format!("what is wanted in {name}"), 0.999, 90);
+    }
+}
+
+#[test]
+fn updates_clear_what_was_gathered() {
+    let mut bench = Bench::new("cornell-spheres", small());
     for (slot, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
         assert_eq!(*gathered, Gathered::zeroed(), "slot {slot}");
     }
@@ -215,32 +305,37 @@ fn pictures_are_resolved_by_equation_4() {
             statistics.push(Statistics {
                 flux_high: [flux, flux * b, flux * c, 0.0],
                 flux_low: [flux * 1e-8, 0.0, 0.0, 0.0],
+                accepted_low: (3.0 * a) as u32,
                 ..cpu::reset(10f32.powf(-2.0 - 6.0 * d))
             });
             direct_sums.push(DirectSum {
-                high: [d, 1e6 * c, b, 0.0],
-                low: [0.0, 1e-2 * a, 0.0, 0.0],
+                high: [d, 1e6 * c, b, if a < 0.7 { 3.0 * b } else { 0.0 }],
+                low: [0.0, 1e-2 * a, 0.0, if a < 0.9 { 2.0 } else { 0.0 }],
             });
             // Of some nothing is known yet.
             coverage.push(Coverage {
                 covered: (16.0 * b) as u32,
                 asked: 16,
+                surrounded: u32::from(c < 0.5),
+                padding: 0,
             });
         }
         bench.upload(BufferId::StatisticsOf, &statistics);
         bench.upload(BufferId::DirectSums, &direct_sums);
         bench.upload(BufferId::CoverageOf, &coverage);
         let (iterations, emitted) = (bench.renderer.iterations(), bench.renderer.emitted());
-        let image = bench.renderer.resolve().expect("a picture");
-        let expected = cpu::resolve(
+        let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
+        let resolved = bench.renderer.resolve_all().expect("a picture");
+        let (expected, behind_glass) = cpu::resolve(
             &bench.settings,
+            &points,
             &statistics,
             &direct_sums,
             &coverage,
             iterations,
             emitted,
         );
-        for (pixel, (found, expected)) in image.pixels().iter().zip(&expected).enumerate() {
+        for (pixel, (found, expected)) in resolved.image.pixels().iter().zip(&expected).enumerate() {
             for channel in 0..3 {
                 let difference = relative_difference(found[channel].into(), expected[channel].into());
                 assert!(
@@ -248,6 +343,20 @@ fn pictures_are_resolved_by_equation_4() {
                     "{estimator:?}, pixel {pixel}: {found:?} on the device, {expected:?} on the CPU"
                 );
             }
+            let waits = resolved.curvature[pixel].is_infinite();
+            assert_eq!(waits, expected[3].is_infinite(), "{estimator:?}, pixel {pixel}: waits");
         }
+        for (pixel, (found, expected)) in resolved.behind_glass.iter().zip(&behind_glass).enumerate() {
+            let values =
+                |glass: &BehindGlass| [glass.unbent, glass.arrived, glass.photons, glass.radius, glass.radius2];
+            for (found, expected) in values(found).into_iter().zip(values(expected)) {
+                let difference = relative_difference(found.into(), expected.into());
+                assert!(
+                    difference < 4.0 * TOLERANCE,
+                    "{estimator:?}, pixel {pixel}: {found} on the device, {expected} on the CPU"
+                );
+            }
+        }
+        assert!(behind_glass.iter().filter(|glass| glass.radius > 0.0).count() > 20);
     }
 }

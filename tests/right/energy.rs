@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, dvec3};
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, RenderConfig, Sampler};
+use ppm_vk::config::{Direct, EmissionChoice, RenderConfig, Sampler};
 use ppm_vk::cpu::{self, Batch, Counts, Inputs};
-use ppm_vk::layout::Photon;
+use ppm_vk::emission::Aim;
+use ppm_vk::layout::{CAUSTIC, Photon};
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::stage::BufferId;
 
@@ -41,7 +42,12 @@ fn config(direct: Direct) -> RenderConfig {
         direct,
         radius: Some(0.01),
         max_depth: MAX_DEPTH,
+        drop_unwanted: false,
         sampler: Sampler::Independent,
+        // Paths of one power, none of which is rejected.
+        emission: EmissionChoice::Power,
+        // Of seed 0 one path stays in the faceted glass for longer.
+        seed: 1,
         ..small(8, PATHS)
     }
 }
@@ -57,16 +63,18 @@ pub fn on_both(subject: &Subject, config: &RenderConfig) -> [(&'static str, Vec<
     );
     let twin = cpu::Renderer::new(&subject.packed, &subject.scene.cameras[0], config.clone()).expect("renderer");
     let inputs = Inputs {
+        demand: None,
         scene: &subject.packed,
         settings: twin.settings(),
         config,
+        emission: twin.aim().map(Aim::table),
     };
     let batch = Batch {
         iteration: 0,
         first_path: 0,
         paths: PATHS,
     };
-    let on_cpu = cpu::photons(&inputs, batch, &Counts::default());
+    let on_cpu = cpu::photons(&inputs, batch, &Counts::default()).lanes;
     [("device", photon_lanes(&mut renderer)), ("CPU", on_cpu)]
 }
 
@@ -79,7 +87,7 @@ fn flux(subject: &Subject, lanes: &[Vec<Photon>], channel: usize, weight: impl F
     let of_lane = |lane: &Vec<Photon>| {
         let photons = lane.iter();
         let sum: f64 = photons
-            .map(|photon| xyz(photon.flux_direction)[channel] * weight(photon.position_object[3].to_bits()))
+            .map(|photon| xyz(photon.flux_direction)[channel] * weight(photon.position_object[3].to_bits() & !CAUSTIC))
             .sum();
         sum / (paths_a_lane * area_unit)
     };

@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable;
 use glam::Vec3;
-use ppm_vk::config::{Direct, Probe, RenderConfig};
+use ppm_vk::config::{Direct, EmissionChoice, Probe, RenderConfig};
 use ppm_vk::cpu;
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{Gathered, Photon, Statistics, VisiblePoint};
@@ -17,13 +17,13 @@ fn assert_gathers_agree(
     bench: &mut Bench,
     what: &str,
     points: &[VisiblePoint],
-    statistics: &[Statistics],
+    radii2: &[f32],
     photons: &[Photon],
 ) -> Vec<u32> {
     let mut expected = vec![Gathered::zeroed(); points.len()];
-    cpu::gather_naive(points, statistics, photons, &mut expected);
+    cpu::gather_naive(points, radii2, photons, &mut expected);
     bench.upload(BufferId::VisiblePoints, points);
-    bench.upload(BufferId::StatisticsOf, statistics);
+    bench.upload(BufferId::Radii2, radii2);
     bench.upload(BufferId::Photons, photons);
     bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);
     let count = |gathered: &Gathered| gathered.flux_count[3].to_bits();
@@ -78,8 +78,8 @@ fn a_grid_of_1e15_cells_takes_no_more_memory_and_finds_every_photon() {
             }
         }
     }
-    let statistics = vec![cpu::reset(RADIUS * RADIUS); points.len()];
-    let found = assert_gathers_agree(&mut bench, "1e15 cells", &points, &statistics, &photons);
+    let radii2 = vec![RADIUS * RADIUS; points.len()];
+    let found = assert_gathers_agree(&mut bench, "1e15 cells", &points, &radii2, &photons);
     for (slot, (m, point)) in found.iter().zip(&points).enumerate() {
         let expected = u32::from(object(point.position_object).is_some());
         assert!(
@@ -98,7 +98,7 @@ fn radii_that_differ_by_a_million_in_one_picture_find_their_photons() {
         .map(|[x, y, ..]| [2.0 * x - 1.0, 2.0 * y - 1.0, 0.5])
         .collect();
     let points: Vec<VisiblePoint> = places.iter().map(|place| visible_point(*place, 0)).collect();
-    let statistics: Vec<Statistics> = radii.iter().map(|radius| cpu::reset(radius * radius)).collect();
+    let radii2: Vec<f32> = radii.iter().map(|radius| radius * radius).collect();
     let near = |part: f32| {
         places
             .iter()
@@ -106,7 +106,7 @@ fn radii_that_differ_by_a_million_in_one_picture_find_their_photons() {
             .map(move |([x, y, z], r)| photon([x + part * r, *y, *z], 0, [1.0; 3]))
     };
     let photons: Vec<Photon> = near(0.5).chain(near(1.5)).collect();
-    let found = assert_gathers_agree(&mut bench, "radii from 1e-6 to 1", &points, &statistics, &photons);
+    let found = assert_gathers_agree(&mut bench, "radii from 1e-6 to 1", &points, &radii2, &photons);
     let (least, most) = (found.iter().min(), found.iter().max());
     println!("{least:?} to {most:?} photons a visible point");
     assert!(
@@ -129,6 +129,9 @@ fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing()
     let config = RenderConfig {
         direct: Direct::Photons,
         radius: Some(0.2),
+        // Each path has as many photons.
+        emission: EmissionChoice::Power,
+        drop_unwanted: false,
         max_depth: DEPTH,
         ..square(16, PATHS)
     };

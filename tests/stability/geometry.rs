@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, RenderConfig};
+use ppm_vk::config::{Direct, EmissionChoice, RenderConfig};
 
 use super::model::{Model, parallelogram};
 use super::sound::{assert_mean, render, square};
@@ -48,6 +48,7 @@ fn assert_patch_is_right(what: &str, model: &Model) {
     let config = RenderConfig {
         direct: Direct::Photons,
         radius: Some(0.2),
+        emission: EmissionChoice::Power,
         ..square(8, 200_000)
     };
     let paths = f64::from(config.photons);

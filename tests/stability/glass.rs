@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, Estimator, RenderConfig};
+use ppm_vk::config::{Direct, EmissionChoice, Estimator, RenderConfig};
 use ppm_vk::cpu;
 use ppm_vk::layout::{NO_OBJECT, Settings, VisiblePoint};
 use ppm_vk::scene::{PackedScene, Scene};
@@ -99,6 +99,8 @@ fn all_light_of_a_lamp_inside_a_glass_ball_arrives() {
     let config = RenderConfig {
         direct: Direct::Photons,
         radius: Some(0.05),
+        drop_unwanted: false,
+        emission: EmissionChoice::Power,
         ..square(16, 20_000)
     };
     let paths = config.photons;

@@ -4,7 +4,7 @@ use ppm_vk::backend::{Backend, Counters};
 use ppm_vk::config::RenderConfig;
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
-use ppm_vk::layout::{DirectSum, Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::layout::{DirectSum, Gathered, NO_OBJECT, Photon, Statistics, VisiblePoint};
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::scene::Scene;
 use ppm_vk::stage::BufferId;
@@ -133,8 +133,13 @@ pub fn assert_sound(renderer: &mut Renderer) -> Image {
     assert_amounts("DirectSums", sums.iter().map(|sum| first3(sum.high)));
     assert_numbers("rest of DirectSums", sums.iter().map(|sum| first3(sum.low)));
     assert_amounts("Film", image.pixels().iter().copied());
-    for (slot, s) in statistics.iter().enumerate() {
-        assert!(s.radius2_high > 0.0, "slot {slot} of StatisticsOf: R² is 0");
+    for (slot, (s, point)) in statistics.iter().zip(&points).enumerate() {
+        let sees_a_surface = point.position_object[3].to_bits() != NO_OBJECT;
+        let has_photons = (s.accepted_low | s.accepted_high) != 0;
+        assert!(
+            !(sees_a_surface && has_photons) || s.radius2_high > 0.0,
+            "slot {slot} of StatisticsOf: R² is 0"
+        );
     }
     image
 }

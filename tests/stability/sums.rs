@@ -109,6 +109,7 @@ fn iterate(bench: &mut Bench, iterations: u32, arriving: impl Fn(u32) -> u32) {
     let mut recording = Recording::new();
     for _ in 0..at_once {
         naive(bench.renderer.sizes(), &mut recording);
+        recording.dispatch(StageDesc::new(&shaders::RADII, SLOTS));
         recording.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS));
     }
     for _ in 0..iterations / at_once {
@@ -159,6 +160,7 @@ fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
         ..Gathered::zeroed()
     };
     let mut update = Recording::new();
+    update.dispatch(StageDesc::new(&shaders::RADII, SLOTS));
     update.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS));
     let mut exact = Exact::START;
     for _ in 0..ITERATIONS {

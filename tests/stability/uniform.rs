@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use glam::Vec3;
-use ppm_vk::config::{Direct, RenderConfig};
+use ppm_vk::config::{Direct, EmissionChoice, RenderConfig};
 use ppm_vk::scene::Scene;
 
 use super::bench::object;
@@ -48,6 +48,8 @@ pub fn assert_lit_by_photons(what: &str, scene: &Scene, radiances: &[f32]) {
     let config = RenderConfig {
         direct: Direct::Photons,
         radius: Some(0.05 / scene.normalisation.scale),
+        drop_unwanted: false,
+        emission: EmissionChoice::Power,
         ..square(8, PATHS)
     };
     let photons = render(scene, 0, 1, config).photons();

@@ -26,13 +26,40 @@ const fn columns((degree, coefficients, first): (usize, u32, &[u32])) -> [u32; 3
     v
 }
 
-const COLUMNS: [[u32; 32]; 3] = [columns(DIMENSIONS[0]), columns(DIMENSIONS[1]), columns(DIMENSIONS[2])];
+/// For each byte of an index, what its digits add to a coordinate.
+type Sums = [[u32; 256]; 4];
+
+const fn sums(columns: [u32; 32]) -> Sums {
+    let mut sums = [[0; 256]; 4];
+    let mut byte = 0;
+    while byte < 4 {
+        let mut value = 1;
+        while value < 256usize {
+            let highest = value.ilog2();
+            // Without its highest digit it is a value before.
+            sums[byte][value] = sums[byte][value ^ 1 << highest] ^ columns[8 * byte + highest as usize];
+            value += 1;
+        }
+        byte += 1;
+    }
+    sums
+}
+
+static SUMS: [Sums; 3] = [
+    sums(columns(DIMENSIONS[0])),
+    sums(columns(DIMENSIONS[1])),
+    sums(columns(DIMENSIONS[2])),
+];
 
 /// The coordinates of the point `index`, times 2³².
 fn unscrambled(index: u32) -> [u32; 4] {
-    let digits = (0..32).filter(|digit| index >> digit & 1 == 1);
-    let [y, z, w] = COLUMNS.map(|columns| digits.clone().fold(0, |sum, digit| sum ^ columns[digit]));
-    [index.reverse_bits(), y, z, w]
+    let bytes = index.to_le_bytes();
+    let coordinate = |sums: &Sums| {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|byte| sums[byte][usize::from(bytes[byte])]);
+        a ^ b ^ c ^ d
+    };
+    let [y, z, w] = &SUMS;
+    [index.reverse_bits(), coordinate(y), coordinate(z), coordinate(w)]
 }
 
 /// Flips each digit or not, depending on those above it.
@@ -56,7 +83,7 @@ pub(super) fn point(index: u32, seed: [u32; 4]) -> [u32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::pcg4d;
+    use crate::random::pcg4d;
 
     /// Of 2^m points from a multiple of 2^m on, each interval of length 2^−m has one in every coordinate, and each of the
     /// m + 1 ways to cut the square into 2^m equal rectangles of powers of two gives one a rectangle in the first two.

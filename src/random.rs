@@ -1,7 +1,9 @@
-//! The numbers that `glsl/shared/random.glsl` draws, bit for bit.
+//! The numbers that `glsl/shared/random.glsl` draws, bit for bit. The host needs them too, to know where photon paths
+//! started.
 
-use super::{Inputs, sobol};
-use crate::config::Sampler;
+mod sobol;
+
+use crate::config::{RenderConfig, Sampler};
 
 /// What kind of path draws: mixed into the seed, so that kinds don't draw the same numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,13 +63,13 @@ impl Random {
     }
 
     /// Those of a pixel, or of something else that has one path an iteration.
-    pub fn of_pixel(inputs: &Inputs<'_>, kind: PathKind, pixel: u32, iteration: u32) -> Self {
-        let block = inputs.config.block_of(iteration);
+    pub fn of_pixel(config: &RenderConfig, kind: PathKind, pixel: u32, iteration: u32) -> Self {
+        let block = config.block_of(iteration);
         Self {
             sequence: pixel,
             block,
             index: iteration - block,
-            ..Self::with(inputs.config.sampler, kind, pixel, iteration, inputs.settings.seed)
+            ..Self::with(config.sampler, kind, pixel, iteration, config.seed)
         }
     }
 
@@ -82,18 +84,17 @@ impl Random {
         }
     }
 
+    /// Leaves out the quadruples before this one.
+    pub fn skip_to(&mut self, dimension: u32) {
+        self.dimension = dimension;
+    }
+
     /// Those of a photon path; `path` counts those of the iteration.
-    pub fn of_photon(inputs: &Inputs<'_>, path: u32, iteration: u32) -> Self {
+    pub fn of_photon(config: &RenderConfig, path: u32, iteration: u32) -> Self {
         Self {
-            block: inputs.config.block_of(iteration),
-            index: inputs.config.first_of_block(iteration).wrapping_add(path),
-            ..Self::with(
-                inputs.config.sampler,
-                PathKind::Photon,
-                path,
-                iteration,
-                inputs.settings.seed,
-            )
+            block: config.block_of(iteration),
+            index: config.first_of_block(iteration).wrapping_add(path),
+            ..Self::with(config.sampler, PathKind::Photon, path, iteration, config.seed)
         }
     }
 

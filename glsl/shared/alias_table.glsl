@@ -1,0 +1,35 @@
+// The alias method: Vose, «A Linear Algorithm For Generating Random Numbers With a Given Distribution», IEEE Transactions
+// on Software Engineering 17(9), 1991. `alias.rs` makes the tables.
+
+// A cell of a table, and how far into it a number lies.
+struct AliasPlace {
+    uint cell;
+    float within;
+};
+
+// What was chosen, and what is left of the number that chose it, uniform in [0, 1].
+struct Choice {
+    uint index;
+    float rest;
+};
+
+// u has 24 bits, and the two `digits` below it as many again: what has one chance in 10¹² is then chosen as often as it
+// should be.
+AliasPlace alias_place(uint count, float u, vec2 digits) {
+    uvec3 bits = uvec3(vec3(u, digits) * 16777216.0);
+    // A fraction of 64 bits times the number of cells: the cell, and a fraction of 64 bits within it.
+    uint cell, part, carried, lower_part, carry;
+    umulExtended(bits.x << 8u | bits.y >> 16u, count, cell, part);
+    umulExtended(bits.y << 16u | bits.z >> 8u, count, carried, lower_part);
+    part = uaddCarry(part, carried, carry);
+    return AliasPlace(cell + carry,
+                      float(part) * (1.0 / 4294967296.0) + float(lower_part) * (1.0 / 4294967296.0 / 4294967296.0));
+}
+
+// `accept`: the part of the cell that chooses what has its number; `alias`: what the rest of it chooses.
+Choice alias_choice(AliasPlace place, float accept, uint alias) {
+    if (place.within < accept || accept >= 1.0) {
+        return Choice(place.cell, min(place.within / accept, 1.0));
+    }
+    return Choice(alias, min((place.within - accept) / (1.0 - accept), 1.0));
+}

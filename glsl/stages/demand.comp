@@ -1,0 +1,85 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// What each visible point wants of photons, entered into the cells that its disc reaches: the squared relative error that a
+// photon of flux 1 would make of its pixel, times the visible points that such a photon reaches, up to a constant. A pixel
+// whose light is mostly direct wants few; where nothing is entered, no visible point can accept a photon.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "texel.glsl"
+#include "visible_point.glsl"
+#include "statistics.glsl"
+#include "grid.glsl"
+#include "demand.glsl"
+
+layout(push_constant) uniform Push {
+    uint iterations; // done so far
+    float emitted;   // photon paths of all of them
+} push;
+
+uniform usamplerBuffer VisiblePoints;
+uniform usamplerBuffer StatisticsOf;
+uniform usamplerBuffer DirectSums;
+layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
+layout(std430) readonly buffer Footprints { float footprints[]; };
+layout(std430) readonly buffer Radii2 { float radii2[]; };
+layout(std430) readonly buffer Grid { GridShape grid; };
+layout(std430) buffer Demand { uint demand[]; }; // float bits; cleared before
+
+// Of the picture so far, mean of the channels.
+float radiance_of(uint slot) {
+    float radiance = 0.0;
+    if (push.iterations > 0u) {
+        radiance = mean_of(TEXEL(DirectSums, 2u * slot).rgb) / float(push.iterations);
+        for (uint map = 0u; map < settings.photon_maps; map++) {
+            uint i = map * slots() + slot;
+            float radius2 = TEXEL(StatisticsOf, 3u * i).x;
+            float tau = mean_of(TEXEL(StatisticsOf, 3u * i + 1u).rgb);
+            radiance += tau / push.emitted / (PI * max(radius2, 1e-30) * share_of(coverage[i]));
+        }
+    }
+    return radiance;
+}
+
+void main() {
+    uint i = invocation_index();
+    if (i >= receiver_count()) {
+        return;
+    }
+    uint slot = i % slots();
+    vec4 position_object = TEXEL(VisiblePoints, 3u * slot);
+    uint object = floatBitsToUint(position_object.w);
+    float radius2 = radii2[i];
+    if (object == NO_OBJECT) {
+        return;
+    }
+    float radius = sqrt(radius2);
+    float footprint = max(footprints[slot], 1e-3 * radius);
+    float radiance = radiance_of(slot);
+    float of_one = mean_of(TEXEL(VisiblePoints, 3u * slot + 1u).rgb) / (PI * radius2);
+    float reached = PI * radius2 / (footprint * footprint);
+    uint wanted = floatBitsToUint(clamp(of_one * of_one * reached / (radiance * radiance + settings.demand_floor2), 1e-30, 1e30));
+
+    float reach = radius * 1.000001 + 1e-7;
+    uvec2 shells = shells_of(position_object.xyz, radius);
+    for (uint shell = shells.x; shell <= shells.y; shell++) {
+        uint of_shell = i / slots() * SHELLS + shell;
+        float inverse = grid.inverse_cell_size[of_shell] * (1.0 / COARSENING);
+        ivec3 low = cell_of(position_object.xyz - reach, inverse);
+        ivec3 high = cell_of(position_object.xyz + reach, inverse);
+        for (int z = low.z; z <= high.z; z++) {
+            for (int y = low.y; y <= high.y; y++) {
+                for (int x = low.x; x <= high.x; x++) {
+                    uint entry = demand_entry(ivec3(x, y, z), of_shell, object);
+                    // Neighbours in the picture enter much the same.
+                    if (demand[entry] < wanted) {
+                        atomicMax(demand[entry], wanted);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,445 @@
+//! Cells and their probabilities, learned from what paths were worth.
+
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+
+use super::path_value::PathValue;
+use super::strata::{Stratum, strata};
+use super::table::{Chosen, DIMENSIONS, Table};
+use super::targets::targets;
+use crate::alias::alias_table;
+use crate::config::{MOST_EMISSION_CELLS, RenderConfig};
+use crate::layout::{EmissionCell, VisiblePoint};
+use crate::radius;
+use crate::random::Random;
+use crate::scene::PackedScene;
+
+/// Rounds of learning before the first iteration, each of a quarter of its paths.
+pub const PILOT_ROUNDS: u32 = 4;
+/// Paths of one of the first iterations that are learned from at the most, and of a later one: where photons are wanted is found
+/// early, and seldom ones of much flux need many paths to be found.
+const COUNTED_PATHS: [u32; 2] = [1 << 16, 1 << 14];
+/// The first of the later iterations.
+const LATER: u32 = 16;
+/// How many times better aimed paths have to be than those by power: they cost more than their rays.
+const WORTH_IT: f64 = 2.5;
+/// Rays that a path may take on average, where paths by power take fewer. Those that are aimed at glass take many: some of
+/// them aren't traced, and the others carry their flux.
+const FEWEST_RAYS: f64 = 4.0;
+/// Rays and starts that a cell is taken to have had already, as good as all others'.
+const PRIOR: f64 = 16.0;
+/// A path counts for no more than so many times the median of those that are worth something: rare ones of much flux would
+/// drown what the others tell.
+const MOST_VALUE: f64 = 1000.0;
+/// How many times larger or smaller an update makes a cell's probability at the most, where it had many paths.
+const LARGEST_CHANGE: f64 = 16.0;
+/// Paths with which a cell's change may be half of that.
+const TRUSTED: f64 = 32.0;
+/// Parts of a cell along each coordinate that are told apart.
+const BINS: usize = 8;
+/// Paths that a cell is cut in two with at the least.
+const CUT_PATHS: f64 = 64.0;
+/// The part of the variance that has to be saved at the least, if each part of the cell had a density of its own.
+const CUT_CONTRAST: f64 = 0.04;
+/// How large χ² of the parts' values has to be: with one degree of freedom less than parts, 1 in 1000 by chance.
+const SIGNIFICANT: f64 = 24.0;
+/// Cuts that an update makes through a cell, one after the other.
+const CUT_ROUNDS: usize = 8;
+/// The thinnest that a cell may be: random numbers have steps of 2⁻²⁴.
+const THINNEST: f32 = 1.0 / 65536.0;
+
+/// The iteration whose random numbers a pilot round draws. No render gets that far, and the radius has its own.
+pub fn pilot_iteration(round: u32) -> u32 {
+    radius::PILOT - 1 - round
+}
+
+/// Whether paths of an iteration are learned from: later ones have so many before them that few of a block are enough.
+pub fn is_learned_from(config: &RenderConfig, iteration: u32) -> bool {
+    iteration < 64 || iteration - config.block_of(iteration) < 4
+}
+
+/// Paths of an iteration that are learned from at the most.
+pub fn counted_paths(iteration: u32) -> u32 {
+    let later = (LATER..pilot_iteration(PILOT_ROUNDS)).contains(&iteration);
+    COUNTED_PATHS[usize::from(later)]
+}
+
+/// What is known of a cell's paths: sums in path order, so that they have the same bits in every run.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Counts {
+    paths: f64,
+    value: f64,
+    rays: f64,
+    /// Σ value².
+    squares: f64,
+    /// Along each coordinate, paths in equal parts of the cell.
+    paths_in: [[f64; BINS]; DIMENSIONS],
+    /// Their value.
+    value_in: [[f64; BINS]; DIMENSIONS],
+}
+
+impl Counts {
+    /// What its paths cost: one for each start, and one for each ray.
+    fn cost(&self) -> f64 {
+        self.paths + self.rays
+    }
+
+    /// These parts of the paths and of the value, about which no more is known.
+    fn part(&self, paths: f64, value: f64) -> Self {
+        Self {
+            paths: self.paths * paths,
+            value: self.value * value,
+            rays: self.rays * paths,
+            squares: self.squares * value,
+            paths_in: scaled(self.paths_in, paths),
+            value_in: scaled(self.value_in, value),
+        }
+    }
+
+    /// What the same paths would be worth if each were worth so many times as much.
+    fn revalued(&self, factor: f64) -> Self {
+        Self {
+            value: self.value * factor,
+            squares: self.squares * factor * factor,
+            value_in: scaled(self.value_in, factor),
+            ..*self
+        }
+    }
+}
+
+fn scaled(sums: [[f64; BINS]; DIMENSIONS], factor: f64) -> [[f64; BINS]; DIMENSIONS] {
+    sums.map(|along| along.map(|sum| sum * factor))
+}
+
+/// What is known of the parts of half a cell, if each of its own was known as one.
+fn of_half(sums: [f64; BINS], upper: bool) -> [f64; BINS] {
+    let first = if upper { BINS / 2 } else { 0 };
+    std::array::from_fn(|part| 0.5 * sums[first + part / 2])
+}
+
+/// A box of a stratum's starts.
+#[derive(Debug, Clone)]
+struct Cell {
+    stratum: usize,
+    low: [f32; DIMENSIONS],
+    size: [f32; DIMENSIONS],
+    probability: f64,
+    /// By which its paths start.
+    density: f64,
+    counts: Counts,
+}
+
+impl Cell {
+    fn volume(&self) -> f64 {
+        self.size.iter().map(|&side| f64::from(side)).product()
+    }
+}
+
+/// Where to cut a cell in two.
+#[derive(Debug, Clone, Copy)]
+struct Cut {
+    dimension: usize,
+    /// Part of the cell's probability that the lower half should have.
+    lower: f64,
+    contrast: f64,
+}
+
+/// Mean value and mean number of rays of paths.
+#[derive(Debug, Clone, Copy, Default)]
+struct Worth {
+    value: f64,
+    rays: f64,
+}
+
+impl Worth {
+    fn add(&mut self, probability: f64, value: f64, rays: f64) {
+        self.value += probability * value;
+        self.rays += probability * rays;
+    }
+
+    /// Variance times cost.
+    fn product(&self) -> f64 {
+        self.value * self.rays
+    }
+}
+
+/// What a path that is counted tells.
+struct Counted {
+    cell: usize,
+    bins: [usize; DIMENSIONS],
+    value: f64,
+    rays: f64,
+}
+
+/// Where photon paths start, and what is known about that.
+#[derive(Debug, Clone)]
+pub struct Aim {
+    strata: Vec<Stratum>,
+    cells: Vec<Cell>,
+    table: Table,
+    /// Since the last update.
+    has_learned: bool,
+}
+
+impl Aim {
+    /// Before any path. `points`: the visible points of the first iteration.
+    pub fn new(scene: &PackedScene, points: &[VisiblePoint]) -> Self {
+        let targets = targets(scene, points);
+        let spheres = targets.spheres.iter().map(|target| target.sphere.packed());
+        Self::of_strata(strata(scene, &targets), spheres.collect(), targets.view)
+    }
+
+    fn of_strata(strata: Vec<Stratum>, spheres: Vec<[f32; 4]>, view: Option<u32>) -> Self {
+        let whole = |(stratum, probability): (usize, f64)| Cell {
+            stratum,
+            low: [0.0; DIMENSIONS],
+            size: [1.0; DIMENSIONS],
+            probability,
+            density: probability,
+            counts: Counts::default(),
+        };
+        let initial = strata.iter().map(|stratum| stratum.initial).enumerate();
+        let mut aim = Self {
+            cells: initial.map(whole).collect(),
+            strata,
+            table: Table {
+                spheres,
+                view,
+                cells: Vec::new(),
+            },
+            has_learned: false,
+        };
+        aim.normalise();
+        aim.cells.iter_mut().for_each(|cell| cell.density = cell.probability);
+        aim
+    }
+
+    /// What the next paths start by.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+
+    /// Counts paths that started by the table as it is: those of an iteration from `first_path` on, with what each was worth,
+    /// [`PathValue::packed`]. Looks at [`counted_paths`] of them.
+    pub fn learn(&mut self, config: &RenderConfig, iteration: u32, first_path: u32, values: &[u32]) {
+        let table = &self.table;
+        let count = |(number, &word): (usize, &u32)| {
+            let mut random = Random::of_photon(config, first_path + number as u32, iteration);
+            let (u, w) = (random.next4(), random.next4());
+            let PathValue { value, rays } = PathValue::unpacked(word);
+            let Chosen { cell, within } = table.choose(u, w);
+            Counted {
+                cell,
+                bins: within.map(|coordinate| ((coordinate * BINS as f64) as usize).min(BINS - 1)),
+                value: value.into(),
+                rays: rays.into(),
+            }
+        };
+        let values = &values[..values.len().min(counted_paths(iteration) as usize)];
+        let counted: Vec<Counted> = values.par_iter().enumerate().with_min_len(1024).map(count).collect();
+        self.has_learned = true;
+        let mut useful: Vec<f64> = counted
+            .iter()
+            .map(|path| path.value)
+            .filter(|&value| value > 0.0)
+            .collect();
+        let middle = useful.len() / 2;
+        let most = if useful.is_empty() {
+            0.0
+        } else {
+            MOST_VALUE * *useful.select_nth_unstable_by(middle, f64::total_cmp).1
+        };
+        // In units of their mean, so that what was learned beside a darker picture weighs as much.
+        let sum: f64 = useful.iter().map(|value| value.min(most)).sum();
+        let unit = if sum > 0.0 { sum / counted.len() as f64 } else { 1.0 };
+        for path in counted {
+            let value = path.value.min(most) / unit;
+            // The last cell stands for paths that aren't traced.
+            let Some(cell) = self.cells.get_mut(path.cell) else {
+                continue;
+            };
+            let counts = &mut cell.counts;
+            counts.paths += 1.0;
+            counts.value += value;
+            counts.rays += path.rays;
+            counts.squares += value * value;
+            for (dimension, &bin) in path.bins.iter().enumerate() {
+                counts.paths_in[dimension][bin] += 1.0;
+                counts.value_in[dimension][bin] += value;
+            }
+        }
+    }
+
+    /// Makes the table that what was learned asks for: a path's value is taken to be its contribution's square. The
+    /// probability that makes the mean's variance least for the same cost is in proportion to the square root of the
+    /// squared contribution's density over the cost.
+    pub fn update(&mut self) {
+        let value: f64 = self.cells.iter().map(|cell| cell.counts.value).sum();
+        let cost: f64 = self.cells.iter().map(|cell| cell.counts.cost()).sum();
+        if !std::mem::take(&mut self.has_learned) || value == 0.0 {
+            return;
+        }
+        let mean = value / cost;
+        for cell in &mut self.cells {
+            let counts = &cell.counts;
+            let rate = (counts.value / mean + PRIOR) / (counts.cost() + PRIOR);
+            let limit = 1.0 + (LARGEST_CHANGE - 1.0) * counts.paths / (counts.paths + TRUSTED);
+            cell.probability *= rate.sqrt().clamp(1.0 / limit, limit);
+        }
+        for _ in 0..CUT_ROUNDS {
+            self.cut();
+        }
+        self.normalise();
+        for cell in &mut self.cells {
+            // What is known already counts half, and as paths that had started by the new density.
+            let density = cell.probability / cell.volume();
+            let factor = (cell.density / density).powi(2);
+            cell.counts = cell.counts.part(0.5, 0.5).revalued(factor);
+            cell.density = density;
+        }
+    }
+
+    /// Cuts cells in two whose halves differ, those first that matter most.
+    fn cut(&mut self) {
+        let cells = self.cells.iter().enumerate();
+        let mut cuts: Vec<(usize, Cut)> = cells
+            .filter_map(|(index, cell)| Some((index, self.best_cut(cell)?)))
+            .collect();
+        let gain = |&(index, cut): &(usize, Cut)| self.cells[index].probability * cut.contrast;
+        cuts.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+        cuts.truncate(MOST_EMISSION_CELLS as usize - 1 - self.cells.len().min(MOST_EMISSION_CELLS as usize - 1));
+        for (index, Cut { dimension, lower, .. }) in cuts {
+            let whole = self.cells[index].clone();
+            let counts = &whole.counts;
+            let of_lower = |sums: &[f64; BINS]| sums[..BINS / 2].iter().sum::<f64>();
+            let paths = of_lower(&counts.paths_in[dimension]) / counts.paths;
+            let value = of_lower(&counts.value_in[dimension]) / counts.value;
+            let half = |upper: bool| {
+                let part = |lower: f64| if upper { 1.0 - lower } else { lower };
+                let mut cell = whole.clone();
+                cell.size[dimension] *= 0.5;
+                if upper {
+                    cell.low[dimension] += cell.size[dimension];
+                }
+                cell.probability *= part(lower);
+                cell.counts = counts.part(part(paths), part(value));
+                cell.counts.paths_in[dimension] = of_half(counts.paths_in[dimension], upper);
+                cell.counts.value_in[dimension] = of_half(counts.value_in[dimension], upper);
+                cell
+            };
+            self.cells[index] = half(false);
+            self.cells.push(half(true));
+        }
+    }
+
+    fn best_cut(&self, cell: &Cell) -> Option<Cut> {
+        let counts = &cell.counts;
+        if counts.paths < CUT_PATHS || counts.value == 0.0 {
+            return None;
+        }
+        let one_light = self.strata[cell.stratum].lights.len() == 1;
+        let usable = if one_light { DIMENSIONS - 1 } else { DIMENSIONS };
+        let value = counts.value;
+        // As many equal values would vary as these do.
+        let effective = value * value / counts.squares;
+        let prior = PRIOR / BINS as f64;
+        let rate = |value: f64, paths: f64| (value + prior * counts.value / counts.paths) / (paths + prior);
+        let cuts = (0..usable).filter(|&dimension| cell.size[dimension] > THINNEST);
+        let cuts = cuts.filter_map(|dimension| {
+            let (paths, values) = (&counts.paths_in[dimension], &counts.value_in[dimension]);
+            let rates: [f64; BINS] = std::array::from_fn(|bin| rate(values[bin], paths[bin]));
+            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+            // As the density is to be in proportion to the root.
+            let contrast = 1.0 - mean(&rates.map(f64::sqrt)).powi(2) / mean(&rates);
+            let squares: f64 = values.iter().map(|part| (part / value).powi(2)).sum();
+            let chi2 = effective * (BINS as f64 * squares - 1.0);
+            let (lower, upper) = rates.split_at(BINS / 2);
+            let (a, b) = (mean(lower).sqrt(), mean(upper).sqrt());
+            let cut = Cut {
+                dimension,
+                lower: a / (a + b),
+                contrast,
+            };
+            (contrast > CUT_CONTRAST && chi2 > SIGNIFICANT).then_some(cut)
+        });
+        cuts.max_by(|a, b| a.contrast.total_cmp(&b.contrast))
+    }
+
+    /// Makes the probabilities' sum 1 and each no less than its floor, and the table of them.
+    fn normalise(&mut self) {
+        let strata = &self.strata;
+        let floor = |cell: &Cell| strata[cell.stratum].floor * cell.volume();
+        let floors: f64 = self.cells.iter().map(floor).sum();
+        let sum: f64 = self.cells.iter().map(|cell| cell.probability).sum();
+        for cell in &mut self.cells {
+            cell.probability = floor(cell) + (1.0 - floors) * cell.probability / sum;
+        }
+        let traced = self.traced();
+        let mut probabilities: Vec<f64> = self.cells.iter().map(|cell| traced * cell.probability).collect();
+        probabilities.push(1.0 - traced);
+        let alias = alias_table(&probabilities);
+        let untraced = alias[self.cells.len()];
+        let packed = self.cells.iter().zip(&alias).map(|(cell, entry)| {
+            let stratum = &strata[cell.stratum];
+            let [low @ .., low_light] = cell.low;
+            let [size @ .., size_light] = cell.size;
+            EmissionCell {
+                low,
+                size,
+                low_light,
+                size_light,
+                weight: (cell.volume() / (traced * cell.probability)) as f32,
+                accept: entry.accept,
+                alias: entry.alias,
+                first_light: stratum.lights.start,
+                lights: stratum.lights.len() as u32,
+                target: stratum.target,
+            }
+        });
+        self.table.cells = packed.collect();
+        self.table.cells.push(EmissionCell {
+            size: [1.0; 4],
+            size_light: 1.0,
+            lights: 1,
+            accept: untraced.accept,
+            alias: untraced.alias,
+            ..EmissionCell::zeroed()
+        });
+    }
+
+    /// Whether aimed paths are worth their cost: how much less the picture's squared error has for the same rays than with paths
+    /// by power, in the same time. In a closed room nearly every photon is of use wherever it starts.
+    pub fn is_worth_it(&self) -> bool {
+        let (mut aimed, mut by_power) = (Worth::default(), Worth::default());
+        for cell in self.cells.iter().filter(|cell| cell.counts.paths > 0.0) {
+            let counts = &cell.counts;
+            let [value, rays] = [counts.value, counts.rays].map(|sum| sum / counts.paths);
+            let share = self.strata[cell.stratum].share * cell.volume();
+            aimed.add(cell.probability, value, rays);
+            // The same paths' flux is larger where they start less often.
+            by_power.add(share, value * (cell.probability / share).powi(2), rays);
+        }
+        aimed.value == 0.0 || by_power.product() > WORTH_IT * aimed.product()
+    }
+
+    /// The part of the paths that is traced, so that all together take about as many rays as by power.
+    fn traced(&self) -> f64 {
+        let rays = |cell: &Cell| {
+            let counts = &cell.counts;
+            if counts.paths > 0.0 {
+                counts.rays / counts.paths
+            } else {
+                1.0
+            }
+        };
+        let cells = || self.cells.iter();
+        let by_power: f64 = cells()
+            .map(|cell| self.strata[cell.stratum].share * cell.volume() * rays(cell))
+            .sum();
+        let aimed: f64 = cells().map(|cell| cell.probability * rays(cell)).sum();
+        (by_power.max(FEWEST_RAYS) / aimed.max(f64::MIN_POSITIVE)).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,143 @@
+//! The strata of photon paths: those of a source that meet one target before any other, or none.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+
+use super::targets::{Sphere, Targets, corners_of};
+use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
+use crate::scene::PackedScene;
+
+/// Of a stratum's share of the power, what its probability is at least: no photon carries much more than by power.
+const FLOOR: f64 = 0.2;
+/// What the floors may be together, without the part that is alike.
+const MOST_FLOOR: f64 = 0.4;
+/// The part of all paths that goes to all strata alike.
+const EXPLORED: f64 = 0.2;
+/// Lights of a source that are asked for the share of its paths that meet a target.
+const PROBES: usize = 64;
+
+/// Paths of a source that meet a target first.
+#[derive(Debug, Clone)]
+pub(super) struct Stratum {
+    /// Of [`PackedScene::lights`].
+    pub lights: Range<u32>,
+    /// Index of the target, or the number of targets for paths that meet none.
+    pub target: u32,
+    /// About the part of all paths by power that its starts stand for, those that are rejected with them.
+    pub share: f64,
+    /// Its probability at the least.
+    pub floor: f64,
+    /// Before anything is known.
+    pub initial: f64,
+}
+
+/// All strata that can have paths. Their initial probabilities sum up to 1.
+pub(super) fn strata(scene: &PackedScene, targets: &Targets) -> Vec<Stratum> {
+    let power_of =
+        |source: &Range<u32>| -> f64 { lights_of(scene, source).iter().map(|l| f64::from(l.probability)).sum() };
+    let total: f64 = scene.sources.iter().map(power_of).sum();
+    let alike = 1.0 / scene.sources.len() as f64;
+    let mut strata = Vec::new();
+    for source in &scene.sources {
+        let power = power_of(source) / total;
+        let first = strata.len();
+        for target in 0..=targets.spheres.len() {
+            let sphere = targets.spheres.get(target).map(|target| target.sphere);
+            strata.push(Stratum {
+                lights: source.clone(),
+                target: target as u32,
+                share: power * sphere.map_or(1.0, |sphere| share(scene, source, &sphere)),
+                floor: 0.0,
+                initial: 0.0,
+            });
+            if sphere.is_some_and(|sphere| is_met_by_all(scene, source, targets, &sphere)) {
+                break;
+            }
+        }
+        share_out(&mut strata[first..], targets, 0.5 * (power + alike));
+    }
+    let shares: f64 = strata.iter().map(|stratum| stratum.share).sum();
+    let explored = EXPLORED / strata.len() as f64;
+    for stratum in &mut strata {
+        stratum.floor = stratum.share * FLOOR.min(MOST_FLOOR / shares) + explored;
+    }
+    strata
+}
+
+fn lights_of<'a>(scene: &'a PackedScene, source: &Range<u32>) -> &'a [Light] {
+    &scene.lights[source.start as usize..source.end as usize]
+}
+
+/// A source's first probability: half of it for specular targets, if there are any and others too.
+fn share_out(strata: &mut [Stratum], targets: &Targets, probability: f64) {
+    let is_specular = |stratum: &Stratum| {
+        let target = targets.spheres.get(stratum.target as usize);
+        target.is_some_and(|target| target.specular)
+    };
+    let specular = strata.iter().filter(|stratum| is_specular(stratum)).count();
+    let others = strata.len() - specular;
+    for stratum in strata {
+        let alike = if is_specular(stratum) { specular } else { others };
+        let kinds = if specular > 0 && others > 0 { 2 } else { 1 };
+        stratum.initial = probability / (kinds * alike) as f64;
+    }
+}
+
+/// Whether a light's rays are from afar.
+fn is_distant(light: &Light) -> bool {
+    [DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT].contains(&light.kind)
+}
+
+/// Points of a light, which has some place.
+fn points_of(scene: &PackedScene, light: &Light) -> [DVec3; 3] {
+    if [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) {
+        return [Vec3::from_array(light.position).as_dvec3(); 3];
+    }
+    corners_of(&scene.shading_triangles[light.triangle as usize])
+}
+
+/// Whether no path of a source that meets anything passes by a sphere.
+fn is_met_by_all(scene: &PackedScene, source: &Range<u32>, targets: &Targets, sphere: &Sphere) -> bool {
+    if sphere.contains(&targets.scene) || *sphere == targets.scene {
+        return true;
+    }
+    let inside = |point: DVec3| {
+        let point = Sphere {
+            centre: point,
+            // Paths leave surfaces by a little.
+            radius: 1e-4 * sphere.radius,
+        };
+        sphere.contains(&point)
+    };
+    let mut lights = lights_of(scene, source).iter();
+    lights.all(|light| !is_distant(light) && points_of(scene, light).into_iter().all(inside))
+}
+
+/// About the share of a source's paths, by its own density, that a density uniform among those towards a sphere has.
+fn share(scene: &PackedScene, source: &Range<u32>, sphere: &Sphere) -> f64 {
+    let lights = lights_of(scene, source);
+    let probes = lights.iter().step_by(lights.len().div_ceil(PROBES));
+    let count = probes.len() as f64;
+    let shares = probes.map(|light| match light.kind {
+        DIRECTIONAL_LIGHT | ENVIRONMENT_LIGHT => PI * sphere.radius.powi(2) / f64::from(light.area),
+        POINT_LIGHT => versine(sphere, points_of(scene, light)[0]) / 2.0,
+        SPOT_LIGHT => {
+            let (inner, outer) = (f64::from(light.inner), f64::from(light.outer));
+            versine(sphere, points_of(scene, light)[0]) / (inner + (outer - inner) / 3.0)
+        }
+        _ => 2.0 * versine(sphere, points_of(scene, light).into_iter().sum::<DVec3>() / 3.0),
+    });
+    shares.map(|share| share.min(1.0)).sum::<f64>() / count
+}
+
+/// 1 − cos of the angle between the axis and the sides of the cone in which a sphere is seen.
+fn versine(sphere: &Sphere, from: DVec3) -> f64 {
+    let sin2 = sphere.radius.powi(2) / sphere.centre.distance_squared(from);
+    if sin2 < 1.0 {
+        sin2 / (1.0 + (1.0 - sin2).sqrt())
+    } else {
+        2.0
+    }
+}

@@ -1,0 +1,93 @@
+//! What is found before the first iteration: visible points, where to aim photon paths, radii.
+
+use super::Renderer;
+use super::stages::reporting;
+use crate::backend::Counters;
+use crate::error::Result;
+use crate::layout::{Photon, Statistics, VisiblePoint};
+use crate::record::Recording;
+use crate::scene::PackedScene;
+use crate::stage::{BufferId, StageDesc};
+use crate::{radius, shaders};
+
+impl Renderer {
+    /// Finds the first visible points, aims photon paths at what discs of a pilot want, and finds the radii: the
+    /// user's, or first ones from the density of pilot photons, one that suits the median visible point, then smaller ones
+    /// where the photons are denser. Resets the statistics.
+    pub(super) fn prepare(&mut self, scene: &PackedScene) -> Result<()> {
+        self.reset()?;
+        self.run_until_it_fits(|stages| {
+            let mut recording = reporting();
+            stages.camera(0, &mut recording);
+            let (order, _) = stages.method();
+            order(stages.sizes, &mut recording);
+            stages.radii(&mut recording);
+            stages.demand(0, &mut recording);
+            recording
+        })?;
+        self.choose_aim(scene)?;
+        if self.config.radius.is_none() {
+            let (_, status) = self.run_until_it_fits(|stages| {
+                let mut recording = reporting();
+                stages.photons(radius::PILOT, 0, &mut recording);
+                recording
+            })?;
+            let landed = u64::from(status.photons_landed_low) | u64::from(status.photons_landed_high) << 32;
+            let kept = u64::from(status.photons_stored_low) | u64::from(status.photons_stored_high) << 32;
+            self.config.drop_unwanted &= radius::is_dropping_worth_it(landed, kept, self.aim.is_some());
+            self.reset()?;
+            self.fit_radii()?;
+        }
+        let statistics: Vec<Statistics> = self
+            .device
+            .download(BufferId::StatisticsOf, Some(self.sizes.slots() as usize))?;
+        self.radius = radius::median(&statistics);
+        self.counters = Counters::default();
+        Ok(())
+    }
+
+    /// First radii from the pilot photons at hand.
+    fn fit_radii(&mut self) -> Result<()> {
+        let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
+        let footprints: Vec<f32> = self.device.download(BufferId::Footprints, None)?;
+        let count: Vec<u32> = self.device.download(BufferId::PhotonCount, Some(1))?;
+        let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
+        // The pilot is a batch; the densities of the whole iteration's photons are higher.
+        let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
+        self.photon_flux = radius::mean_flux(&photons);
+        let first = radius::first(&visible_points, &footprints, &photons, share);
+        self.settings.first_footprints = first.map(|first| first.footprints);
+        self.upload_settings()?;
+        let [global, caustic] = first.map(|first| first.photons as f32 * share);
+        for _ in 0..radius::FITS {
+            self.run_until_it_fits(|stages| {
+                let mut recording = reporting();
+                stages.radii(&mut recording);
+                let (_, gather) = stages.method();
+                gather(stages.sizes, &mut recording);
+                recording
+            })?;
+            let push = [global, caustic, radius::LEAST_FOOTPRINTS];
+            let mut recording = Recording::new();
+            recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, self.sizes.receivers()).push(push));
+            self.run(&recording)?;
+        }
+        if self.sizes.photon_maps == 2 {
+            let mut statistics: Vec<Statistics> = self.device.download(BufferId::StatisticsOf, None)?;
+            let caustic = &mut statistics[footprints.len()..];
+            radius::sharpen(self.config.resolution, &footprints, caustic);
+            self.device.upload(BufferId::StatisticsOf, &statistics)?;
+        }
+        // A radius that was too large where photons are dense says nothing of later gathers.
+        self.sizes.gather_parts = 1;
+        Ok(())
+    }
+
+    fn reset(&mut self) -> Result<()> {
+        let mut recording = reporting();
+        recording.fill(BufferId::DirectSums, 0);
+        recording.fill(BufferId::CoverageOf, 0);
+        recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.receivers()));
+        self.run(&recording).map(|_| ())
+    }
+}
