@@ -540,3 +540,32 @@ device_structs! {
         pub photons_accepted_high: u32,
     }
 }
+
+/// 64 bits from two words.
+fn wide(low: u32, high: u32) -> u64 {
+    u64::from(low) | u64::from(high) << 32
+}
+
+impl Statistics {
+    /// Photons accepted so far.
+    pub fn accepted(&self) -> u64 {
+        wide(self.accepted_low, self.accepted_high)
+    }
+}
+
+impl StatusCounters {
+    /// Photons stored.
+    pub fn photons_stored(&self) -> u64 {
+        wide(self.photons_stored_low, self.photons_stored_high)
+    }
+
+    /// Photons that landed where visible points could be, wanted or not.
+    pub fn photons_landed(&self) -> u64 {
+        wide(self.photons_landed_low, self.photons_landed_high)
+    }
+
+    /// Photons that the picture's visible points accepted in all iterations.
+    pub fn photons_accepted(&self) -> u64 {
+        wide(self.photons_accepted_low, self.photons_accepted_high)
+    }
+}

@@ -7,6 +7,7 @@ use bytemuck::Zeroable;
 use glam::{IVec3, Vec3};
 
 use super::Seen;
+use super::resolve::share_of;
 use super::vector::{mean, word, xyz};
 use crate::config::DEMAND_BITS;
 use crate::layout::{
@@ -144,12 +145,7 @@ impl Progress<'_> {
         let receivers = (slot..self.statistics.len()).step_by(self.direct_sums.len());
         let of_map = |receiver: usize| {
             let (statistics, coverage) = (&self.statistics[receiver], &self.coverage[receiver]);
-            let share = if coverage.covered > 0 {
-                f64::from(coverage.covered) / f64::from(coverage.asked)
-            } else {
-                1.0
-            };
-            let area = f64::from(PI) * f64::from(statistics.radius2_high).max(1e-30) * share;
+            let area = f64::from(PI) * f64::from(statistics.radius2_high).max(1e-30) * share_of(coverage);
             mean(xyz(statistics.flux_high)) / self.emitted as f64 / area
         };
         direct + receivers.map(of_map).sum::<f64>()

@@ -312,8 +312,7 @@ impl Backend for Renderer {
     }
 
     fn resolve_all(&mut self) -> Result<Resolved> {
-        let accepted = |s: &Statistics| u64::from(s.accepted_low) | u64::from(s.accepted_high) << 32;
-        self.counters.photons_accepted = self.statistics.iter().map(accepted).sum();
+        self.counters.photons_accepted = self.statistics.iter().map(Statistics::accepted).sum();
         let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
         let (film, behind_glass) = resolve(
             &self.settings,

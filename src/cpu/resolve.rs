@@ -10,7 +10,7 @@ use super::vector::{from_two_float, from_two_floats, word, xyz};
 use crate::layout::{BehindGlass, Coverage, DirectSum, NO_OBJECT, Settings, Statistics, VisiblePoint};
 
 /// The part of the discs that can have photons; 1 where nothing is known of it.
-fn share_of(coverage: &Coverage) -> f64 {
+pub(super) fn share_of(coverage: &Coverage) -> f64 {
     if coverage.covered > 0 {
         f64::from(coverage.covered) / f64::from(coverage.asked)
     } else {

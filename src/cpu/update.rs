@@ -102,7 +102,7 @@ pub fn update(
             counts.add_non_finite(1);
         } else if new_photons > 0 {
             let alpha = f64::from(alpha);
-            let accepted = u64::from(statistics.accepted_low) | u64::from(statistics.accepted_high) << 32;
+            let accepted = statistics.accepted();
             let (n, m) = (alpha * accepted as f64, f64::from(new_photons));
             let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
             let ratio = (n + alpha * m) / (n + m);

@@ -222,8 +222,7 @@ impl Renderer {
         let run = self.run(&recording)?;
         let status = self.status()?;
         self.counters.non_finite += u64::from(status.non_finite);
-        self.counters.photons_accepted =
-            u64::from(status.photons_accepted_low) | u64::from(status.photons_accepted_high) << 32;
+        self.counters.photons_accepted = status.photons_accepted();
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
         let behind_glass = self.device.download(BufferId::GlassFilm, None)?;
         Ok((run, Resolved::from_film(self.config.resolution, &film, behind_glass)))
@@ -308,13 +307,13 @@ impl Backend for Renderer {
         self.begin_block(iteration)?;
         let (run, status) = self.run_until_it_fits(|stages| stages.iteration(iteration))?;
         let counters = &mut self.counters;
-        counters.photons_stored += u64::from(status.photons_stored_low) | u64::from(status.photons_stored_high) << 32;
+        counters.photons_stored += status.photons_stored();
         counters.truncated_paths += u64::from(status.truncated_paths);
         counters.cut_paths += u64::from(status.cut_paths);
         counters.non_finite += u64::from(status.non_finite);
         counters.lost_photons += u64::from(status.lost_photons);
         counters.full_cells += u64::from(status.full_cells);
-        counters.photons_landed += u64::from(status.photons_landed_low) | u64::from(status.photons_landed_high) << 32;
+        counters.photons_landed += status.photons_landed();
         if is_learned_from(&self.config, iteration) {
             self.learn(iteration, self.sizes.batch_paths)?;
         }

@@ -32,8 +32,7 @@ impl Renderer {
                 stages.photons(radius::PILOT, 0, &mut recording);
                 recording
             })?;
-            let landed = u64::from(status.photons_landed_low) | u64::from(status.photons_landed_high) << 32;
-            let kept = u64::from(status.photons_stored_low) | u64::from(status.photons_stored_high) << 32;
+            let (landed, kept) = (status.photons_landed(), status.photons_stored());
             self.config.drop_unwanted &= radius::is_dropping_worth_it(landed, kept, self.aim.is_some());
             self.reset()?;
             self.fit_radii()?;
