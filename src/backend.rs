@@ -201,6 +201,6 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         photon_maps: 1,
         pixel_spread: 2.0 * half_height / height as f32,
         demand_floor2: 1.0,
-        padding: 0,
+        near_light_count: scene.near_lights.len() as u32,
     }
 }

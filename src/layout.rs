@@ -152,7 +152,8 @@ device_structs! {
         pub initial_radius2: f32,
         /// Iterations that all loops of one invocation may make together.
         pub loop_limit: u32,
-        /// Probability that direct light is sampled by a direction of the BSDF instead of a light's point.
+        /// Probability that direct light is sampled by a direction of the BSDF instead of a light's point, near a
+        /// light.
         pub bsdf_sampling: f32,
         /// R before the first photon in footprints, of global and of caustic photons.
         pub first_footprints: [f32; 2],
@@ -164,8 +165,8 @@ device_structs! {
         pub pixel_spread: f32,
         /// What the squared radiance has beside it where what visible points want of photons is weighed.
         pub demand_floor2: f32,
-        /// Zero.
-        pub padding: u32,
+        /// Spheres in which a light is near.
+        pub near_light_count: u32,
     }
 
     /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf, or one of the two of an

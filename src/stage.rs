@@ -28,6 +28,8 @@ pub enum BufferId {
     Texels,
     /// [`crate::layout::Light`]s.
     Lights,
+    /// Spheres in which a light is near, centre and squared radius: see `scene/near_lights.rs`.
+    NearLights,
     /// What shines from afar, and how directions are chosen from it; see `glsl/shared/environment.glsl`.
     Environment,
     /// Where aimed photon paths start; see [`crate::emission::Table::texels`].

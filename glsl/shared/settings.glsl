@@ -18,11 +18,11 @@ layout(std140) uniform Settings {
     float alpha;                // eq. 2
     float initial_radius2;      // the user's R² before the first photon, render units; 0 where it follows the footprints
     uint loop_limit;            // iterations that all loops of an invocation may make together
-    float bsdf_sampling;        // probability that direct light is sampled by a direction of the BSDF, not a light's point
+    float bsdf_sampling;        // probability that direct light is sampled by a direction of the BSDF, near a light
     vec2 first_footprints;      // R before the first photon in footprints, global and caustic photons
     vec2 most_footprints;       // R at the most; 0: no bound
     uint photon_maps;           // 2 where caustic photons are gathered apart from the others, else 1
     float pixel_spread;         // side of a pixel's footprint at distance 1 along a path, or anywhere where rays are parallel
     float demand_floor2;        // beside the squared radiance where what visible points want of photons is weighed
-    uint padding;
+    uint near_light_count;      // spheres in which a light is near
 } settings;

@@ -36,6 +36,7 @@ layout(push_constant) uniform Push {
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer GlossOf;
 uniform usamplerBuffer StatisticsOf;
+uniform usamplerBuffer NearLights;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 
 // A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
@@ -97,6 +98,17 @@ Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
     return question;
 }
 
+// Whether a light is so near that the squared distance to its points varies much.
+bool is_near_light(vec3 position) {
+    bool near = false;
+    for (uint i = 0u; i < settings.near_light_count && !near; i++) {
+        vec4 sphere = TEXEL(NearLights, i);
+        vec3 apart = position - sphere.xyz;
+        near = dot(apart, apart) <= sphere.w;
+    }
+    return near;
+}
+
 // One ray, by chance towards a point of a light or along a direction of the BSDF, with the density of both together
 // (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
 // variance next to a light. No direction of the BSDF meets a punctual light.
@@ -119,13 +131,13 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool be
     // A reflection may be too narrow for points of lights to find it.
     Reflector reflector = NO_REFLECTOR;
     vec3 viewer = vec3(0.0);
-    float bsdf_sampling = settings.bsdf_sampling;
+    float bsdf_sampling = is_near_light(position) ? settings.bsdf_sampling : 0.0;
     float reflections = 0.0; // of the directions of the BSDF
     if (GLOSSY) {
         Gloss gloss = GLOSS(slot);
         reflector = reflector_of(gloss);
         viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
-        if (reflector.alpha > 0.0 && bsdf_sampling > 0.0) {
+        if (reflector.alpha > 0.0 && settings.near_light_count > 0u) {
             bsdf_sampling = 0.5;
             reflections = reflection_probability(reflector, dot(shading_normal, viewer));
             if (u.x < reflections) {

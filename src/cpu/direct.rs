@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::camera::SeenSlice;
@@ -120,6 +120,13 @@ fn look(
     }
 }
 
+/// Whether a light is so near that the squared distance to its points varies much. In f32, as on a device: it decides.
+fn is_near_light(inputs: &Inputs<'_>, position: DVec3) -> bool {
+    let position = position.as_vec3();
+    let is_within = |&[x, y, z, radius2]: &[f32; 4]| position.distance_squared(Vec3::new(x, y, z)) <= radius2;
+    inputs.scene.near_lights.iter().any(is_within)
+}
+
 /// weight · BRDF · L · cos θ_surface over the density per solid angle of both ways to choose the ray: towards a light
 /// chosen in proportion to its flux, or along a direction of the BSDF, which never meets a light without extent. And whether
 /// glass stands before the light, so that this is what it would bring unbent.
@@ -143,11 +150,12 @@ fn sample_direct(
     );
     // A reflection may be too narrow for points of lights to find it.
     let wide = gloss.filter(|(reflector, _)| reflector.alpha > 0.0);
-    let (q, reflections) = match (wide, f64::from(inputs.settings.bsdf_sampling)) {
-        (Some((reflector, viewer)), q) if q > 0.0 => {
+    let (q, reflections) = match wide {
+        Some((reflector, viewer)) if !inputs.scene.near_lights.is_empty() => {
             (0.5, reflector.reflection_probability(shading_normal.dot(viewer)))
         }
-        (_, q) => (q, 0.0),
+        _ if is_near_light(inputs, position) => (f64::from(inputs.settings.bsdf_sampling), 0.0),
+        _ => (0.0, 0.0),
     };
     let leaves = |ray: DVec3| ray.dot(geometric_normal) > 0.0 && ray.dot(shading_normal) > 0.0;
     // Where nothing but glass stands in the way, that.

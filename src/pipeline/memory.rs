@@ -77,7 +77,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
 }
 
 /// The buffers that hold the scene.
-pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 11] {
+pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 12] {
     [
         (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
         (BufferId::HavelTriangles, bytemuck::cast_slice(&scene.havel_triangles)),
@@ -91,6 +91,7 @@ pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 11] {
         (BufferId::Textures, bytemuck::cast_slice(&scene.textures)),
         (BufferId::Texels, bytemuck::cast_slice(&scene.texels)),
         (BufferId::Lights, bytemuck::cast_slice(&scene.lights)),
+        (BufferId::NearLights, bytemuck::cast_slice(&scene.near_lights)),
         (BufferId::Environment, bytemuck::cast_slice(&scene.environment)),
         (BufferId::ObjectGrids, bytemuck::cast_slice(&scene.object_grids)),
     ]

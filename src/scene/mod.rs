@@ -31,6 +31,7 @@ mod load;
 mod material;
 mod meshopt;
 mod morph;
+mod near_lights;
 pub mod object_grid;
 mod packed;
 mod placement;

@@ -7,15 +7,16 @@ use glam::{DVec3, Vec3, Vec4};
 
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::material::normal_reflectance;
+use super::near_lights::NearLights;
 use super::object_grid::object_grids;
 use super::{
     Alpha, Dielectric, Environment, Gloss, MaterialTextures, SHARED, Scene, Surface, area, bvh, contact, environment,
     light_table,
 };
 use crate::layout::{
-    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, ENVIRONMENT_LIGHT, HavelTriangle, Instance, Light, MASK,
-    Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED, ShadingTriangle,
-    TEXTURED, TOUCHED, TRIANGLE_LIGHT, TextureLookup,
+    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, HavelTriangle, Instance, Light, MASK, Material, NO_LIGHT,
+    NO_TEXTURE, OPAQUE, ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED, ShadingTriangle, TEXTURED, TOUCHED,
+    TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// What the ray stages read, in the order of the BVH's leaves.
@@ -58,8 +59,10 @@ pub struct PackedScene {
     pub order: Vec<u32>,
     /// Render units per scene unit.
     pub scale: f64,
-    /// Probability that direct light is sampled by a direction of the BSDF instead of a light's point.
+    /// Probability that direct light is sampled by a direction of the BSDF instead of a light's point, near a light.
     pub bsdf_sampling: f32,
+    /// Where lights are near: centre and squared radius of spheres.
+    pub near_lights: Vec<[f32; 4]>,
 }
 
 impl PackedScene {
@@ -114,6 +117,12 @@ impl PackedScene {
         let mut texels = scene.textures.texels.clone();
         texels.resize(texels.len().next_multiple_of(4), 0);
         let (object_grids, object_cells) = object_grids(scene);
+        let near_lights = NearLights {
+            lights: &lights,
+            sources: &sources,
+            corners: &corners,
+            environment: scene.environment.as_ref(),
+        };
         Ok(Self {
             power,
             corners: if features.textured {
@@ -130,7 +139,8 @@ impl PackedScene {
             shading_triangles,
             own_triangles,
             instances,
-            bsdf_sampling: bsdf_sampling(scene, &lights),
+            bsdf_sampling: near_lights.bsdf_sampling(area_of_all(scene)),
+            near_lights: near_lights.spheres(),
             materials,
             lights,
             sources,
@@ -348,25 +358,11 @@ fn texture_corners(scene: &Scene, order: &[u32]) -> Vec<Corner> {
     vertices.map(corner).collect()
 }
 
-/// About the chance that a direction of the BSDF meets a light: the part of the scene's area that emits, or of all directions
-/// that the environment's light comes from, half of which lie below a surface. Never 0 where such a direction can meet one: it
-/// bounds the contribution of a light's point next to the surface.
-fn bsdf_sampling(scene: &Scene, lights: &[Light]) -> f32 {
-    let of_kind = |kind: u32| lights.iter().filter(move |light| light.kind == kind);
-    let from_afar: f64 = of_kind(ENVIRONMENT_LIGHT)
-        .zip(&scene.environment)
-        .map(|(light, environment)| f64::from(light.probability) * environment.spread())
-        .sum();
-    let emissive: f64 = of_kind(TRIANGLE_LIGHT).map(|light| f64::from(light.area)).sum();
-    if emissive == 0.0 && scene.environment.is_none() {
-        return 0.0;
-    }
+/// Area of all surfaces.
+fn area_of_all(scene: &Scene) -> f64 {
     let own = scene.own_triangles().map(|triangle| scene.corners_of(triangle));
-    let all: f64 = own
-        .chain(scene.placed_triangles().map(|(_, corners)| corners))
-        .map(area)
-        .sum();
-    ((emissive / all + 0.5 * from_afar) as f32).clamp(0.05, 0.5)
+    let placed = scene.placed_triangles().map(|(_, corners)| corners);
+    own.chain(placed).map(area).sum()
 }
 
 /// Unit vector to two 16-bit numbers, as `glsl/shared/sampling.glsl` has it.

@@ -1,0 +1,66 @@
+//! Where a light is near: there the squared distance to its points varies without bound, and directions of the BSDF are the
+//! better way to sample it. Anywhere else points of the light alone are better, since no ray is lost.
+
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+
+use super::environment::Environment;
+use crate::layout::{ENVIRONMENT_LIGHT, Light, TRIANGLE_LIGHT};
+
+/// Radii of a light within which it is near: outside of it no point of it is more than three times as far as another one.
+const REACH: f64 = 2.0;
+/// The least and the greatest probability that a direction of the BSDF is taken near a light.
+const SAMPLING: [f64; 2] = [0.05, 0.5];
+
+/// Spheres in which lights are near.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NearLights<'a> {
+    pub lights: &'a [Light],
+    /// Ranges of them.
+    pub sources: &'a [Range<u32>],
+    /// Of all triangles, in the order of the BVH's leaves.
+    pub corners: &'a [[Vec3; 3]],
+    pub environment: Option<&'a Environment>,
+}
+
+impl NearLights<'_> {
+    /// A sphere around each source that rays can meet: its centre, and the squared radius of what is near it. An environment is
+    /// near everywhere.
+    pub fn spheres(&self) -> Vec<[f32; 4]> {
+        let sphere = |source: &Range<u32>| {
+            let lights = &self.lights[source.start as usize..source.end as usize];
+            match lights[0].kind {
+                TRIANGLE_LIGHT => Some(self.around(lights)),
+                ENVIRONMENT_LIGHT => Some([0.0, 0.0, 0.0, f32::INFINITY]),
+                _ => None,
+            }
+        };
+        self.sources.iter().filter_map(sphere).collect()
+    }
+
+    fn around(&self, lights: &[Light]) -> [f32; 4] {
+        let corners = || {
+            let of_light = |light: &Light| self.corners[light.triangle as usize].map(Vec3::as_dvec3);
+            lights.iter().flat_map(of_light)
+        };
+        let least = corners().fold(DVec3::INFINITY, DVec3::min);
+        let most = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let centre = 0.5 * (least + most);
+        let radius2 = corners().fold(0.0, |radius2: f64, corner| radius2.max(corner.distance_squared(centre)));
+        centre.as_vec3().extend((REACH.powi(2) * radius2) as f32).to_array()
+    }
+
+    /// Probability that a direction of the BSDF is taken near a light: about the chance that it meets one. That is the part of
+    /// the scene's area that emits, or of all directions that the environment's light comes from, half of which lie below a
+    /// surface.
+    pub fn bsdf_sampling(&self, area_of_all: f64) -> f32 {
+        let of_kind = |kind: u32| self.lights.iter().filter(move |light| light.kind == kind);
+        let from_afar: f64 = of_kind(ENVIRONMENT_LIGHT)
+            .zip(self.environment)
+            .map(|(light, environment)| f64::from(light.probability) * environment.spread())
+            .sum();
+        let emissive: f64 = of_kind(TRIANGLE_LIGHT).map(|light| f64::from(light.area)).sum();
+        (emissive / area_of_all + 0.5 * from_afar).clamp(SAMPLING[0], SAMPLING[1]) as f32
+    }
+}
