@@ -1,6 +1,8 @@
 //! What a progressive renderer offers, whatever it runs on.
 
 use crate::config::RenderConfig;
+#[cfg(doc)]
+use crate::config::SEQUENCES;
 use crate::error::Result;
 use crate::film::Image;
 use crate::layout::{BehindGlass, Settings};
@@ -55,15 +57,24 @@ pub struct Resolved {
     pub curvature: Vec<f32>,
     /// Of each pixel, what tells whether it has its part of the light behind glass.
     pub behind_glass: Vec<BehindGlass>,
+    /// RGB and curvature of each pixel by the iterations of each of [`SEQUENCES`] alone: one picture after another.
+    pub sequences: Vec<[f32; 4]>,
 }
 
 impl Resolved {
-    /// From a renderer's films: RGB and curvature, and what tells of light behind glass, in rows from the top left.
-    pub fn from_film(resolution: [u32; 2], film: &[[f32; 4]], behind_glass: Vec<BehindGlass>) -> Self {
+    /// From a renderer's films, in rows from the top left: RGB and curvature, what tells of light behind glass, and the
+    /// sequences' pictures.
+    pub fn from_film(
+        resolution: [u32; 2],
+        film: &[[f32; 4]],
+        behind_glass: Vec<BehindGlass>,
+        sequences: Vec<[f32; 4]>,
+    ) -> Self {
         Self {
             image: Image::from_film(resolution, film),
             curvature: film.iter().map(|pixel| pixel[3]).collect(),
             behind_glass,
+            sequences,
         }
     }
 }

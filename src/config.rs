@@ -151,6 +151,14 @@ impl Default for RenderConfig {
 /// Pixels of a picture's side at the most.
 pub const MAX_SIDE: u32 = 16384;
 
+/// Sequences of random numbers of low discrepancy that iterations take turns with: iteration i has the next numbers of
+/// sequence i mod 4. They are independent of each other, so that their spread tells the picture's error
+/// ([`crate::estimate`]), and go on through the whole render, so that each converges nearly as fast as one for all would.
+pub const SEQUENCES: u32 = 4;
+
+/// Paths of a pixel in an iteration at the most: what they don't cost much beside so many photon paths.
+const MOST_CAMERA_PATHS: u32 = 8;
+
 impl RenderConfig {
     /// Checks every range.
     ///
@@ -195,14 +203,32 @@ impl RenderConfig {
         self.drop_unwanted && self.estimator == Estimator::Sppm
     }
 
-    /// First of the iterations whose numbers are one sequence of low discrepancy with those of `iteration`. Blocks grow
-    /// with the render, to a fourth of it and less, and are independent of each other: their spread is what the error is
-    /// estimated from ([`crate::estimate`], whose batches are whole blocks).
+    /// First iteration of the block of `iteration`. With each block the photons' [`SEQUENCES`] begin anew, since they may be
+    /// aimed anew. Blocks grow with the render, to the half of it.
     pub fn block_of(&self, iteration: u32) -> u32 {
-        let grown = 1 << (iteration.max(4).ilog2() - 2);
+        let octave = if iteration < 2 * SEQUENCES {
+            iteration / SEQUENCES * SEQUENCES
+        } else {
+            1 << iteration.ilog2()
+        };
         // A sequence has 2³² points.
-        let most = 1 << (u32::MAX / self.photons.max(1)).max(1).ilog2();
-        iteration / grown.min(most) * grown.min(most)
+        let most = SEQUENCES.saturating_mul(1 << (u32::MAX / self.photons.max(1)).max(1).ilog2());
+        octave.max(iteration / most * most)
+    }
+
+    /// Whether photons' sequences begin anew with an iteration, so that they may be aimed anew.
+    pub fn begins_sequences(&self, iteration: u32) -> bool {
+        iteration - self.block_of(iteration) < if iteration < 2 * SEQUENCES { SEQUENCES } else { 1 }
+    }
+
+    /// Paths of a pixel in an iteration: about one for each photon path. All of them see what is lit directly, the first one's
+    /// visible point gathers photons. The paper has one.
+    pub fn camera_paths(&self) -> u32 {
+        let pixels = self.resolution[0].saturating_mul(self.resolution[1]).max(1);
+        match self.estimator {
+            Estimator::Ppm => 1,
+            Estimator::Sppm => (self.photons.saturating_add(pixels / 2) / pixels).clamp(1, MOST_CAMERA_PATHS),
+        }
     }
 
     /// Points of the disc around each visible point that `coverage` asks in an iteration: many at first, since what few say
@@ -217,8 +243,8 @@ impl RenderConfig {
         iteration < 8 || iteration.is_multiple_of(32)
     }
 
-    /// Photon paths of the block before `iteration`.
-    pub fn first_of_block(&self, iteration: u32) -> u32 {
-        (iteration - self.block_of(iteration)).wrapping_mul(self.photons)
+    /// Photon paths of the block before `iteration` that are of its sequence.
+    pub fn first_of_sequence(&self, iteration: u32) -> u32 {
+        ((iteration - self.block_of(iteration)) / SEQUENCES).wrapping_mul(self.photons)
     }
 }

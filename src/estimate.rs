@@ -1,9 +1,8 @@
 //! How far the picture is from the truth, as far as it can tell by itself.
 //!
 //! The picture after n iterations is the mean of n pictures: eq. 3 scales τ as eq. 2 scales R², so τ / R² is the sum of
-//! every iteration's flux over its own R². Pictures that are taken now and then therefore give the means of batches of
-//! iterations, which are independent of each other ([`crate::config::RenderConfig::block_of`]); their spread tells the
-//! noise.
+//! every iteration's flux over its own R². Iterations take turns with sequences of random numbers that are independent of each
+//! other ([`SEQUENCES`]): the spread of the sequences' means tells the noise.
 //!
 //! The bias is what R blurs. Photons are summed up a second time, weighed with 1 − 2 d²/R² by their distance d: where their
 //! density is even or falls evenly that sum vanishes, where it bends it is a third of what the blur adds, with the opposite
@@ -15,25 +14,20 @@
 //!
 //! Light behind glass, which photons alone bring, is missing until they found it (`estimate/missing.rs`).
 
-mod batches;
 mod missing;
 mod parts;
+mod spread;
 
 use rayon::prelude::*;
 
 use crate::backend::{Backend, Resolved};
-use crate::config::{Estimator, RenderConfig};
+use crate::config::{Estimator, RenderConfig, SEQUENCES};
 use crate::film::Image;
-use crate::layout::BehindGlass;
 use crate::metrics::floor_of;
 use crate::scene::PackedScene;
-use batches::Batches;
 use parts::{OfPixel, Parts};
+use spread::{Spread, Weights};
 
-/// Batches at the most; then neighbours are joined. Even, so that the halves are alike.
-const MOST_BATCHES: usize = 8;
-/// Batches from which an estimate is made.
-const FEWEST_BATCHES: usize = 4;
 /// Bias over curvature, root of the mean square: 3 where the density bends evenly, for a disc's means of r² and of
 /// r² (1 − 2 r²) are 1/2 and −1/6; 5.46 across the edge of a shadow, by integrating both over its distance. Between them, and
 /// nearer to the former: at the edges of caustics discs are small.
@@ -41,19 +35,12 @@ const BIAS_PER_CURVATURE: f64 = 3.4;
 /// Part of the error from which on its cause is worth a word.
 const NOTABLE: f64 = 0.2;
 
-/// Pictures taken while a render goes on, and what follows from them.
-#[derive(Debug)]
+/// What the error of a render's pictures is estimated by.
+#[derive(Debug, Clone, Copy)]
 pub struct ErrorEstimate {
-    alpha: f64,
     /// Whether pixels are seen through their centres alone.
     sees_centres: bool,
     photon: OnePhoton,
-    /// Iterations of a batch.
-    batch: u32,
-    /// Pictures after 1, 2, … batches.
-    pictures: Vec<Resolved>,
-    /// Of each pixel after the last iterations that a picture was taken of.
-    behind_glass: Vec<BehindGlass>,
 }
 
 /// An estimate of the relative error, as root of relMSE.
@@ -91,7 +78,7 @@ impl std::fmt::Display for RelativeError {
 
 /// A pixel in the dark beside a bright patch has little of its own: against what R brings it from there the error would seem
 /// small. Of the curvature, four times the standard error is in doubt.
-fn own_part(curvature: &Batches, channels: &[Batches; 3]) -> f64 {
+fn own_part(curvature: &Spread, channels: &[Spread; 3]) -> f64 {
     let brought = BIAS_PER_CURVATURE * (-curvature.mean - 4.0 * curvature.noise2().sqrt()).max(0.0);
     let mean = channels.iter().map(|channel| channel.mean).sum::<f64>() / 3.0;
     if mean > 0.0 {
@@ -126,69 +113,40 @@ pub fn of_one_photon(scene: &PackedScene, backend: &dyn Backend, config: &Render
 }
 
 impl ErrorEstimate {
-    /// Before the first iteration of a render; `photon` is [`of_one_photon`].
+    /// Of a render; `photon` is [`of_one_photon`].
     pub fn new(config: &RenderConfig, photon: OnePhoton) -> Self {
         Self {
-            alpha: f64::from(config.alpha),
             sees_centres: config.estimator == Estimator::Ppm,
             photon,
-            batch: 1,
-            pictures: Vec::new(),
-            behind_glass: Vec::new(),
         }
     }
 
-    /// Whether a picture is wanted after so many iterations.
-    pub fn wants(&self, iterations: u32) -> bool {
-        iterations == self.batch * (self.pictures.len() as u32 + 1)
+    /// Whether an estimate is worth its time after so many iterations: each sequence has had as many of them, and they are a
+    /// fourth more than the last time or so.
+    pub fn is_due(iterations: u32) -> bool {
+        iterations >= SEQUENCES && iterations.is_multiple_of(SEQUENCES.max(1 << iterations.ilog2().saturating_sub(2)))
     }
 
-    /// Takes the picture after so many iterations; those that aren't wanted are left out.
-    pub fn add(&mut self, iterations: u32, mut picture: Resolved) {
-        if !self.wants(iterations) {
-            return;
-        }
-        self.behind_glass = std::mem::take(&mut picture.behind_glass);
-        self.pictures.push(picture);
-        if self.pictures.len() > MOST_BATCHES {
-            // The last one begins the next batch of twice the size, and is taken again when that is whole.
-            self.pictures.truncate(MOST_BATCHES);
-            let mut index = 0;
-            self.pictures.retain(|_| {
-                index += 1;
-                index % 2 == 0
-            });
-            self.batch *= 2;
-        }
-    }
-
-    /// Batches of which the estimate is made.
-    fn batches(&self) -> Option<&[Resolved]> {
-        (self.pictures.len() >= FEWEST_BATCHES).then_some(&self.pictures)
-    }
-
-    /// What is known after so many iterations; `None` before there are enough, and while the picture is black.
-    fn parts(&self, iterations: u32) -> Option<Parts> {
-        let pictures = self.batches()?;
-        let last = &pictures[pictures.len() - 1];
-        let floor = floor_of(&last.image);
-        if floor <= 0.0 {
+    /// What the picture after so many iterations says; `None` before each sequence has had one, and while the picture is black.
+    fn parts(&self, iterations: u32, picture: &Resolved) -> Option<Parts> {
+        let floor = floor_of(&picture.image);
+        if iterations < SEQUENCES || floor <= 0.0 {
             return None;
         }
-        // Since the last picture the noise has fallen as n^−α, the bias as n^(α−1).
-        let taken = f64::from(self.batch) * pictures.len() as f64;
-        let since = f64::from(iterations.max(1)) / taken;
-        let width = last.image.width();
-        let channel_of = |picture: &Resolved, pixel: usize, channel: usize| picture.image.pixels()[pixel][channel];
+        let weights = Weights::of(iterations);
+        let (width, pixels) = (picture.image.width(), picture.curvature.len());
+        let spread_of = |pixel: usize, channel: usize| {
+            let of_sequence = |sequence: usize| f64::from(picture.sequences[sequence * pixels + pixel][channel]);
+            Spread::of(weights, std::array::from_fn(of_sequence))
+        };
         let around = [0, 1, 2].map(|channel| {
-            let values = (0..last.curvature.len()).map(|pixel| f64::from(channel_of(last, pixel, channel)));
+            let values = picture.image.pixels().iter().map(|pixel| f64::from(pixel[channel]));
             parts::sums_around(&values.collect::<Vec<_>>(), width)
         });
-        let photon = self.photon.radiance / taken;
+        let photon = self.photon.radiance / f64::from(iterations);
         let of_pixel = |pixel: usize| {
-            let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
-            let curvature = Batches::of(pictures.iter().map(|picture| finite(picture.curvature[pixel])));
-            let without_photons = last.curvature[pixel].is_infinite();
+            let curvature = spread_of(pixel, 3);
+            let without_photons = picture.curvature[pixel].is_infinite();
             let photon2 = if without_photons { photon.powi(2) } else { 0.0 };
             // Without the pixel itself.
             let mean_around = |channel: usize, value: f64| {
@@ -199,16 +157,14 @@ impl ErrorEstimate {
                     value
                 }
             };
-            let channels: [Batches; 3] = std::array::from_fn(|channel| {
-                Batches::of(pictures.iter().map(|picture| channel_of(picture, pixel, channel)))
-            });
+            let channels: [Spread; 3] = std::array::from_fn(|channel| spread_of(pixel, channel));
             OfPixel {
-                values: channels.each_ref().map(|batches| batches.mean),
-                noise2: channels.each_ref().map(|batches| batches.noise2() + photon2),
+                values: channels.each_ref().map(|spread| spread.mean),
+                noise2: channels.each_ref().map(|spread| spread.noise2() + photon2),
                 relative_noise2: std::array::from_fn(|channel| {
-                    let batches = &channels[channel];
-                    batches.relative_noise2(mean_around(channel, batches.mean), floor)
-                        + photon2 / (batches.mean.powi(2) + floor)
+                    let spread = &channels[channel];
+                    spread.relative_noise2(mean_around(channel, spread.mean), floor)
+                        + photon2 / (spread.mean.powi(2) + floor)
                 }),
                 photon2,
                 own: own_part(&curvature, &channels),
@@ -217,17 +173,16 @@ impl ErrorEstimate {
         };
         Some(Parts {
             width,
-            pixels: (0..last.curvature.len()).into_par_iter().map(of_pixel).collect(),
+            pixels: (0..pixels).into_par_iter().map(of_pixel).collect(),
             floor,
-            fallen: [since.powf(-self.alpha), since.powf(2.0 * (self.alpha - 1.0))],
             sees_centres: self.sees_centres,
-            missing: missing::missing(&self.behind_glass, width, photon * self.photon.radius2),
+            missing: missing::missing(&picture.behind_glass, width, photon * self.photon.radius2),
         })
     }
 
-    /// The estimate after so many iterations; `None` before there are enough, and while the picture is black.
-    pub fn relative(&self, iterations: u32) -> Option<RelativeError> {
-        let parts = self.parts(iterations)?;
+    /// The error of the picture after so many iterations; `None` before there are enough, and while it is black.
+    pub fn relative(&self, iterations: u32, picture: &Resolved) -> Option<RelativeError> {
+        let parts = self.parts(iterations, picture)?;
         let noise2 = parts.relative_noise2();
         let [bias2, aliasing2] = [parts.relative_bias2(), parts.relative_aliasing2()].map(|part| part.max(0.0));
         let missing2 = parts.relative_missing2();
@@ -249,14 +204,17 @@ impl ErrorEstimate {
 
     /// The error of each pixel, root of the mean square, in units of radiance; `None` as in [`ErrorEstimate::relative`], of
     /// whose error it is the parts. A pixel's bias is that of the pixels around it: its own is all but lost in noise.
-    pub fn of_pixels(&self, iterations: u32) -> Option<Image> {
-        let parts = self.parts(iterations)?;
-        let last = &self.pictures.last()?.image;
+    pub fn of_pixels(&self, iterations: u32, picture: &Resolved) -> Option<Image> {
+        let parts = self.parts(iterations, picture)?;
         let errors = parts
             .of_pixels()
             .into_iter()
             .map(|error2| error2.map(|part| part.sqrt() as f32));
-        Some(Image::new(last.width(), last.height(), errors.collect()))
+        Some(Image::new(
+            picture.image.width(),
+            picture.image.height(),
+            errors.collect(),
+        ))
     }
 }
 

@@ -3,7 +3,7 @@
 
 mod sobol;
 
-use crate::config::{RenderConfig, Sampler};
+use crate::config::{RenderConfig, SEQUENCES, Sampler};
 
 /// What kind of path draws: mixed into the seed, so that kinds don't draw the same numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,6 +18,45 @@ pub enum PathKind {
     Coverage = 0x636f_7665,
 }
 
+/// One of an iteration's paths of a pixel, or of what they lead to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CameraTurn {
+    /// The iteration.
+    pub iteration: u32,
+    /// Number of the path.
+    pub path: u32,
+    /// Of so many: [`RenderConfig::camera_paths`].
+    pub paths: u32,
+}
+
+impl CameraTurn {
+    /// The only one of the first iteration.
+    pub const FIRST: Self = Self {
+        iteration: 0,
+        path: 0,
+        paths: 1,
+    };
+
+    /// Whose visible points gather photons.
+    pub fn that_gathers(config: &RenderConfig, iteration: u32) -> Self {
+        Self {
+            iteration,
+            path: 0,
+            paths: config.camera_paths(),
+        }
+    }
+
+    /// The others of its iteration.
+    pub fn others(self) -> impl Iterator<Item = Self> {
+        (1..self.paths).map(move |path| Self { path, ..self })
+    }
+
+    /// As stages take it.
+    pub fn words(self) -> [u32; 3] {
+        [self.iteration, self.path, self.paths]
+    }
+}
+
 /// The numbers of one path in one iteration.
 #[derive(Debug, Clone, Copy)]
 pub struct Random {
@@ -28,9 +67,9 @@ pub struct Random {
     seed: u32,
     /// How many quadruples have been drawn.
     dimension: u32,
-    /// Of low discrepancy: a pixel's own, or that of all photons.
+    /// Of low discrepancy: a pixel's own, or one of all photons.
     sequence: u32,
-    /// First of the iterations whose numbers are one sequence.
+    /// Of iterations whose numbers are one sequence.
     block: u32,
     /// In that sequence.
     index: u32,
@@ -62,14 +101,35 @@ impl Random {
         }
     }
 
-    /// Those of a pixel, or of something else that has one path an iteration.
-    pub fn of_pixel(config: &RenderConfig, kind: PathKind, pixel: u32, iteration: u32) -> Self {
-        let block = config.block_of(iteration);
+    /// Those of a pixel, or of something else that has a path in each turn.
+    pub fn of_pixel(config: &RenderConfig, kind: PathKind, pixel: u32, turn: CameraTurn) -> Self {
+        let CameraTurn { iteration, path, paths } = turn;
         Self {
             sequence: pixel,
+            block: iteration % SEQUENCES,
+            index: iteration / SEQUENCES * paths + path,
+            ..Self::with(
+                config.sampler,
+                kind,
+                pixel,
+                iteration.wrapping_mul(paths).wrapping_add(path),
+                config.seed,
+            )
+        }
+    }
+
+    /// Those of so many points of a disc. Several are a set of their own, later ones go on in one sequence.
+    pub fn of_disc(config: &RenderConfig, slot: u32, iteration: u32, points: u32) -> Self {
+        let (block, index) = if points > 1 {
+            (iteration, 0)
+        } else {
+            (u32::MAX, iteration)
+        };
+        Self {
+            sequence: slot,
             block,
-            index: iteration - block,
-            ..Self::with(config.sampler, kind, pixel, iteration, config.seed)
+            index,
+            ..Self::with(config.sampler, PathKind::Coverage, slot, iteration, config.seed)
         }
     }
 
@@ -92,8 +152,9 @@ impl Random {
     /// Those of a photon path; `path` counts those of the iteration.
     pub fn of_photon(config: &RenderConfig, path: u32, iteration: u32) -> Self {
         Self {
+            sequence: iteration % SEQUENCES,
             block: config.block_of(iteration),
-            index: config.first_of_block(iteration).wrapping_add(path),
+            index: config.first_of_sequence(iteration).wrapping_add(path),
             ..Self::with(config.sampler, PathKind::Photon, path, iteration, config.seed)
         }
     }

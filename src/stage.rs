@@ -46,6 +46,8 @@ pub enum BufferId {
     GatheredOf,
     /// [`crate::layout::DirectSum`] of each slot.
     DirectSums,
+    /// Radiance (RGB and curvature) that each slot had in the iterations of a sequence, for each of [`crate::config::SEQUENCES`].
+    SequenceSums,
     /// [`crate::layout::Coverage`] of each slot, for each photon map.
     CoverageOf,
     /// Side of each slot's pixel where its visible point is, f32.
@@ -128,6 +130,8 @@ pub enum BufferId {
     Film,
     /// [`crate::layout::BehindGlass`] of each pixel, row-major from the top left.
     GlassFilm,
+    /// As [`BufferId::Film`], the mean of the iterations of each of [`crate::config::SEQUENCES`] alone, one after another.
+    SequenceFilm,
     /// [`crate::layout::StatusCounters`].
     Status,
 

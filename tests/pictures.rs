@@ -123,7 +123,7 @@ fn photons_that_do_not_fit_make_room_and_lose_nothing() {
         ..small(16, 2000)
     };
     let mut renderer = furnace.renderer(config.clone());
-    (0..2).for_each(|_| drop(renderer.iterate().expect("iteration")));
+    (0..8).for_each(|_| drop(renderer.iterate().expect("iteration")));
     let (counters, image) = (renderer.counters(), renderer.resolve().expect("picture"));
     // One path a lane: the lanes' room for an average path doesn't hold the longest.
     assert!(
@@ -132,7 +132,7 @@ fn photons_that_do_not_fit_make_room_and_lose_nothing() {
     );
     // The CPU's buffers grow by themselves.
     let mut cpu = ppm_vk::cpu::Renderer::new(&furnace.packed, &furnace.scene.cameras[0], config).expect("renderer");
-    (0..2).for_each(|_| drop(cpu.iterate().expect("iteration")));
+    (0..8).for_each(|_| drop(cpu.iterate().expect("iteration")));
     let (stored, expected) = (counters.photons_stored as f64, cpu.counters().photons_stored as f64);
     assert!(
         (stored / expected - 1.0).abs() < 2e-3,

@@ -31,7 +31,7 @@ struct Random {
     uint seed;      // the user's, mixed with the kind of path
     uint dimension; // how many quadruples have been drawn
     uint sequence;  // of low discrepancy: a pixel's own, or that of all photons
-    uint block;     // first of the iterations whose numbers are one sequence
+    uint block;     // of iterations whose numbers are one sequence
     uint index;     // in that sequence
     uint state;     // of the congruential generator
 };
@@ -46,14 +46,28 @@ Random random_for(uint kind, uint path, uint iteration, uint block, uint sequenc
     return Random(path, iteration, mixed, 0u, sequence, block, index, mixed + iteration * 0x9e3779b1u + path);
 }
 
-// For a pixel, or something else that has one path an iteration.
-Random random_of_pixel(uint kind, uint pixel, uint iteration, uint block, uint seed) {
-    return random_for(kind, pixel, iteration, block, pixel, iteration - block, seed);
+// Of an iteration's paths of a pixel, or of what one of them leads to.
+struct CameraTurn {
+    uint iteration;
+    uint path;
+    uint paths; // see config::RenderConfig::camera_paths
+};
+
+// For a pixel, or something else that has a path in each turn.
+Random random_of_pixel(uint kind, uint pixel, CameraTurn turn, uint seed) {
+    uint index = turn.iteration / SEQUENCES * turn.paths + turn.path;
+    return random_for(kind, pixel, turn.iteration * turn.paths + turn.path, turn.iteration % SEQUENCES, pixel, index, seed);
 }
 
 // For a photon path of an iteration that begins at `first` in its sequence.
 Random random_of_photon(uint path, uint iteration, uint block, uint first, uint seed) {
-    return random_for(PHOTON_PATH, path, iteration, block, 0u, first + path, seed);
+    return random_for(PHOTON_PATH, path, iteration, block, iteration % SEQUENCES, first + path, seed);
+}
+
+// For so many points of a disc. Several are a set of their own, later ones go on in one sequence.
+Random random_of_disc(uint slot, uint iteration, uint points, uint seed) {
+    uint block = points > 1u ? iteration : 0xffffffffu;
+    return random_for(COVERAGE_SAMPLE, slot, iteration, block, slot, points > 1u ? 0u : iteration, seed);
 }
 
 // For one of several samples that a path takes alike.

@@ -31,7 +31,8 @@ layout(constant_id = 19) const bool LENS = false;
 
 layout(push_constant) uniform Push {
     uint iteration;
-    uint block; // see config::RenderConfig::block_of
+    uint path;  // of the pixel, of so many in this iteration
+    uint paths;
 } push;
 
 layout(std430) writeonly buffer VisiblePoints { VisiblePoint visible_points[]; };
@@ -104,8 +105,9 @@ void main() {
     uvec2 pixel = pixel_of(pixel_slot);
     bool inside = all(lessThan(pixel, settings.resolution));
 
-    Random random = random_of_pixel(CAMERA_PATH, pixel.y * settings.resolution.x + pixel.x, push.iteration, push.block,
-                                    settings.seed);
+    Random random =
+        random_of_pixel(CAMERA_PATH, pixel.y * settings.resolution.x + pixel.x, CameraTurn(push.iteration, push.path, push.paths),
+                        settings.seed);
     vec4 u = next4(random);
     vec2 film = (vec2(pixel) + (JITTER ? u.xy : vec2(0.5))) / vec2(settings.resolution) * 2.0 - 1.0;
 

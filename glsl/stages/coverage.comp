@@ -23,7 +23,6 @@ layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push {
     uint iteration;
-    uint block; // see config::RenderConfig::block_of
     uint points; // a power of two up to WHOLE
 } push;
 
@@ -159,7 +158,7 @@ void main() {
     bool has_photons = (accepted.x | accepted.y | TEXEL_BITS(GatheredOf, 2u * receiver).w) != 0u;
     Coverage before = coverage[receiver];
     bool trusted = before.covered == before.asked && before.asked >= TRUSTED * WHOLE;
-    Random random = random_of_pixel(COVERAGE_SAMPLE, slot, push.iteration, push.block, settings.seed);
+    Random random = random_of_disc(slot, push.iteration, push.points, settings.seed);
     if (!has_photons && receiver < slots() && before.surrounded == 0u && !has_caustic_photons(slot)) {
         Random behind = random;
         behind.dimension = WHOLE; // those of the disc

@@ -30,7 +30,8 @@ layout(constant_id = 24) const bool ASKS_BEHIND_GLASS = true; // in this iterati
 
 layout(push_constant) uniform Push {
     uint iteration;
-    uint block; // see config::RenderConfig::block_of
+    uint path;  // of the pixel, of so many in this iteration
+    uint paths;
 } push;
 
 uniform usamplerBuffer VisiblePoints;
@@ -38,6 +39,7 @@ uniform usamplerBuffer GlossOf;
 uniform usamplerBuffer StatisticsOf;
 uniform usamplerBuffer NearLights;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
+layout(std430) buffer SequenceSums { vec4 sequence_sums[]; };
 
 // A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
 const float ENDS_BEFORE = 16.0 / 16777216.0;
@@ -115,7 +117,8 @@ bool is_near_light(vec3 position) {
 // behind_glass: glass stands before the light, so that this is what it would bring unbent.
 vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool behind_glass) {
     behind_glass = false;
-    Random random = random_of_pixel(LIGHT_SAMPLE, slot, push.iteration, push.block, settings.seed);
+    CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
+    Random random = random_of_pixel(LIGHT_SAMPLE, slot, turn, settings.seed);
     vec4 u = next4(random);
     // What chooses among many lights needs more digits.
     vec4 digits = settings.light_count > 1u ? next4(random) : vec4(0.0);
@@ -264,6 +267,7 @@ void main() {
         atomicAdd(status.non_finite, 1u);
         return;
     }
+    radiance /= float(push.paths);
     DirectSum sum = direct_sums[slot];
     add_to(sum.high.r, sum.low.r, radiance.r);
     add_to(sum.high.g, sum.low.g, radiance.g);
@@ -271,4 +275,5 @@ void main() {
     sum.high.w += unbent;
     sum.low.w += asks ? 1.0 : 0.0;
     direct_sums[slot] = sum;
+    sequence_sums[(push.iteration % SEQUENCES) * slots() + slot].rgb += radiance;
 }

@@ -33,7 +33,7 @@ layout(constant_id = 25) const bool DROP_UNWANTED = true; // photons that no vis
 layout(push_constant) uniform Push {
     uint iteration;
     uint block;          // see config::RenderConfig::block_of
-    uint first_of_block; // paths of the block before this iteration
+    uint first_of_sequence; // paths of the block before this iteration, of its sequence
     uint first_path;     // of this batch
     uint path_count;
 } push;
@@ -127,7 +127,7 @@ void main() {
                 finished = true;
                 break;
             }
-            random = random_of_photon(push.first_path + next, push.iteration, push.block, push.first_of_block,
+            random = random_of_photon(push.first_path + next, push.iteration, push.block, push.first_of_sequence,
                                       settings.seed);
             path = start(random);
             value = 0.0;

@@ -1,11 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Takes an iteration's photons into each visible point's statistics (equations 2 and 3).
+// Takes an iteration's photons into each visible point's statistics (equations 2 and 3), and what they add to the picture into
+// the sum of its sequence.
 
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
+#include "sampling.glsl"
 #include "texel.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
@@ -13,34 +15,53 @@ layout(local_size_x = 64) in;
 #include "radius.glsl"
 #include "status.glsl"
 
+layout(push_constant) uniform Push {
+    uint iteration;
+    float photons; // paths of an iteration
+} push;
+
 uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer Radii2 { float radii2[]; };
 layout(std430) buffer StatisticsOf { Statistics statistics[]; };
+layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
+layout(std430) buffer SequenceSums { vec4 sequence_sums[]; };
+
+// Radiance (RGB and curvature) that one iteration's photons of a map give a visible point.
+vec4 update_map(uint receiver, vec3 weight) {
+    Gathered arrived = gathered[receiver];
+    if (floatBitsToUint(arrived.flux_count.w) == 0u) {
+        return vec4(0.0); // nothing has come, and nothing changes
+    }
+    gathered[receiver] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
+    Statistics mine = statistics[receiver];
+    vec4 flux = vec4(weight * arrived.flux_count.rgb, mean_of(weight) * curvature(arrived, radii2[receiver]));
+    // τ is that of a disc of R. A smaller one has been gathered from where that has a bound, see `radii`.
+    float radius2 = mine.radius2_high;
+    flux *= radius2 / radii2[receiver];
+    if (!finite(flux.rgb) || isnan(flux.w) || isinf(flux.w)) {
+        atomicAdd(status.non_finite, 1u);
+        return vec4(0.0);
+    }
+    update_statistics(mine, flux, floatBitsToUint(arrived.flux_count.w), settings.alpha);
+    statistics[receiver] = mine;
+    return flux / push.photons / (PI * radius2 * share_of(coverage[receiver]));
+}
 
 void main() {
-    uint i = invocation_index();
-    if (i >= receiver_count() || status.again != 0u) {
+    uint slot = invocation_index();
+    if (slot >= slots() || status.again != 0u) {
         return;
     }
-    VisiblePoint visible_point = VISIBLE_POINT(i % slots());
+    VisiblePoint visible_point = VISIBLE_POINT(slot);
     if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
         return;
     }
-    Gathered arrived = gathered[i];
-    if (floatBitsToUint(arrived.flux_count.w) == 0u) {
-        return; // nothing has come, and nothing changes
+    vec4 radiance = vec4(0.0);
+    for (uint map = 0u; map < settings.photon_maps; map++) {
+        radiance += update_map(map * slots() + slot, visible_point.weight_normal.rgb);
     }
-    gathered[i] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
-    Statistics mine = statistics[i];
-    vec3 weight = visible_point.weight_normal.rgb;
-    vec4 flux = vec4(weight * arrived.flux_count.rgb, mean_of(weight) * curvature(arrived, radii2[i]));
-    // τ is that of a disc of R. A smaller one has been gathered from where that has a bound, see `radii`.
-    flux *= mine.radius2_high / radii2[i];
-    if (!finite(flux.rgb) || isnan(flux.w) || isinf(flux.w)) {
-        atomicAdd(status.non_finite, 1u);
-        return;
+    if (radiance != vec4(0.0)) {
+        sequence_sums[(push.iteration % SEQUENCES) * slots() + slot] += radiance;
     }
-    update_statistics(mine, flux, floatBitsToUint(arrived.flux_count.w), settings.alpha);
-    statistics[i] = mine;
 }

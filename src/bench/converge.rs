@@ -116,7 +116,7 @@ fn follow(
     known: &mut Convergence,
     measured: &mut dyn FnMut(&Convergence) -> Result<()>,
 ) -> Result<()> {
-    let mut estimate = ErrorEstimate::new(config, of_one_photon(what.scene, renderer, config));
+    let estimate = ErrorEstimate::new(config, of_one_photon(what.scene, renderer, config));
     let (mut wall_s, mut device_s) = (0.0, 0.0);
     let mut next = 1;
     loop {
@@ -126,11 +126,9 @@ fn follow(
         device_s += run.launches.iter().map(|launch| launch.duration_ns * 1e-9).sum::<f64>();
         let iterations = renderer.iterations();
         let last = wall_s >= what.seconds || (what.stop)();
-        if estimate.wants(iterations) {
-            estimate.add(iterations, renderer.resolve_all()?);
-        }
         if iterations == next || last {
-            let comparison = compare(&renderer.resolve()?, what.reference)?;
+            let picture = renderer.resolve_all()?;
+            let comparison = compare(&picture.image, what.reference)?;
             if let Some(curve) = known.curves.last_mut() {
                 curve.points.push(Measured {
                     iterations,
@@ -139,7 +137,7 @@ fn follow(
                     rel_mse: comparison.rel_mse,
                     rmse: comparison.rmse,
                     mean_ratio: comparison.mean_ratio,
-                    estimated_error: estimate.relative(iterations).map(|error| error.total),
+                    estimated_error: estimate.relative(iterations, &picture).map(|error| error.total),
                     efficiency: 1.0 / (comparison.rel_mse * device_s),
                 });
                 let fitted = curve.points.iter().filter(|point| point.iterations >= FIRST_FITTED);

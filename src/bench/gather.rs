@@ -255,7 +255,7 @@ impl GatherBench<'_> {
         };
         // One more, to warm up.
         let median_of = |work: &dyn Fn() -> f64| median((0..=self.repeats).map(|_| work()).skip(1).collect());
-        steps.raytracing_us[1] = median_of(&|| timed_us(|| cpu::camera(&inputs, 0, &counts)).1);
+        steps.raytracing_us[1] = median_of(&|| timed_us(|| cpu::camera(&inputs, cpu::CameraTurn::FIRST, &counts)).1);
         steps.photon_tracing_us[1] =
             median_of(&|| timed_us(|| cpu::compact(&cpu::photons(&inputs, batch, &counts).lanes)).1);
         steps.synthesize_us[1] =

@@ -82,7 +82,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let progress = Progress::new(limits, arguments.quiet);
     let mut profile = Profile::default();
     let profiled = arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some();
-    let mut estimate = ErrorEstimate::new(&config, of_one_photon(&packed, backend.as_ref(), &config));
+    let estimate = ErrorEstimate::new(&config, of_one_photon(&packed, backend.as_ref(), &config));
     let mut error = None;
     while limits.done(backend.iterations(), start.elapsed(), error) < 1.0
         && !(interrupt::asked() && backend.iterations() > 0)
@@ -93,9 +93,9 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
             profile.add(run);
         }
         let iterations = backend.iterations();
-        if estimate.wants(iterations) {
-            estimate.add(iterations, backend.resolve_all()?);
-            error = estimate.relative(iterations).map(|error| error.total);
+        if ErrorEstimate::is_due(iterations) {
+            let picture = backend.resolve_all()?;
+            error = estimate.relative(iterations, &picture).map(|error| error.total);
         }
         progress.show(backend.as_ref(), error);
     }
@@ -104,7 +104,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
 
     let resolved = backend.resolve_all()?;
     let image = &resolved.image;
-    let estimated = estimate.relative(backend.iterations());
+    let estimated = estimate.relative(backend.iterations(), &resolved);
     let metadata = Metadata {
         iterations: u64::from(backend.iterations()),
         photons_emitted: backend.emitted(),
@@ -115,7 +115,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     };
     film::write_exr(
         image,
-        estimate.of_pixels(backend.iterations()).as_ref(),
+        estimate.of_pixels(backend.iterations(), &resolved).as_ref(),
         &output,
         &metadata,
     )?;

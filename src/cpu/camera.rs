@@ -22,7 +22,7 @@ use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
 use crate::layout::{BACK_HIDDEN, FOLLOWED_ALPHA, Gloss, NO_OBJECT, VisiblePoint};
-use crate::random::{PathKind, Random};
+use crate::random::{CameraTurn, PathKind, Random};
 
 /// What is left of a path that splits.
 #[derive(Clone, Copy)]
@@ -123,8 +123,8 @@ struct Slot {
     footprint: f32,
 }
 
-/// The visible points of an iteration.
-pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Seen {
+/// The visible points of one of an iteration's paths of each pixel.
+pub fn camera(inputs: &Inputs<'_>, turn: CameraTurn, counts: &Counts) -> Seen {
     let slots_per_pixel = inputs.settings.slots_per_pixel as usize;
     let mut slots = vec![nothing_seen(DVec3::ZERO); pixel_slots(inputs.settings) * slots_per_pixel];
     slots
@@ -132,7 +132,7 @@ pub fn camera(inputs: &Inputs<'_>, iteration: u32, counts: &Counts) -> Seen {
         .enumerate()
         .for_each(|(pixel_slot, slots)| {
             if let Some(pixel) = pixel_of(inputs.settings.resolution, pixel_slot as u32) {
-                follow(inputs, pixel, iteration, slots, counts);
+                follow(inputs, pixel, turn, slots, counts);
             }
         });
     let glossy = inputs.scene.features.glossy;
@@ -177,10 +177,10 @@ fn seen(inputs: &Inputs<'_>, branch: &Branch, surface: &Surface, facing: &Facing
     }
 }
 
-fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], iteration: u32, slots: &mut [Slot], counts: &Counts) {
+fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [Slot], counts: &Counts) {
     let settings = inputs.settings;
     let [width, _] = settings.resolution;
-    let mut random = Random::of_pixel(inputs.config, PathKind::Camera, pixel[1] * width + pixel[0], iteration);
+    let mut random = Random::of_pixel(inputs.config, PathKind::Camera, pixel[1] * width + pixel[0], turn);
     let [jitter_x, jitter_y, ..] = random.next4();
     let [x, y] = match inputs.config.estimator {
         Estimator::Sppm => [jitter_x, jitter_y],

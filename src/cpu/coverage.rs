@@ -10,7 +10,7 @@ use super::texture::share_there;
 use super::vector::{word, xyz};
 use super::{FAR, Inputs};
 use crate::layout::{Coverage, Gathered, NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint};
-use crate::random::{PathKind, Random};
+use crate::random::Random;
 
 /// What an iteration counts for, whatever its points.
 const WHOLE: u32 = 16;
@@ -48,7 +48,7 @@ pub fn coverage(
             // Without photons there is nothing to correct.
             let photons = statistics.accepted_low | statistics.accepted_high | word(gathered.flux_count);
             let trusted = coverage.covered == coverage.asked && coverage.asked >= TRUSTED * WHOLE;
-            let random = Random::of_pixel(inputs.config, PathKind::Coverage, slot as u32, iteration);
+            let random = Random::of_disc(inputs.config, slot as u32, iteration, points);
             if photons == 0 && index < visible_points.len() && coverage.surrounded == 0 && !has_caustic_photons(slot) {
                 let mut behind = random;
                 behind.skip_to(WHOLE); // those of the disc

@@ -19,27 +19,34 @@ use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
 use crate::layout::{DirectSum, ENVIRONMENT_LIGHT, NO_LIGHT, NO_OBJECT, Statistics, VisiblePoint};
-use crate::random::{PathKind, Random};
+use crate::random::{CameraTurn, PathKind, Random};
 
-/// Adds an iteration's radiance to the sum of each slot.
+/// Adds the radiance that one of an iteration's paths of each pixel saw to the sum of each slot, and to that of the
+/// iteration's sequence.
 pub fn direct<'a>(
     inputs: &Inputs<'_>,
-    iteration: u32,
+    turn: CameraTurn,
     seen: impl Into<SeenSlice<'a>>,
     statistics: &[Statistics],
     counts: &Counts,
     direct_sums: &mut [DirectSum],
+    sums: &mut [[f32; 4]],
 ) {
     let seen = seen.into();
     // The photons that may have brought light behind glass.
     let of_last_map = &statistics[statistics.len() - seen.points.len()..];
-    let slots = direct_sums.par_iter_mut().zip(seen.points).zip(of_last_map).enumerate();
-    slots.for_each(|(slot, ((sum, point), statistics))| {
+    let slots = direct_sums
+        .par_iter_mut()
+        .zip(sums)
+        .zip(seen.points)
+        .zip(of_last_map)
+        .enumerate();
+    slots.for_each(|(slot, (((sum, of_sequence), point), statistics))| {
         let mut radiance = xyz(point.emitted_normal);
         let mut unbent = 0.0;
         let mut asks = false;
         if inputs.config.direct == Direct::Light && word(point.position_object) != NO_OBJECT {
-            let mut random = Random::of_pixel(inputs.config, PathKind::LightSample, slot as u32, iteration);
+            let mut random = Random::of_pixel(inputs.config, PathKind::LightSample, slot as u32, turn);
             let sample = random.next4();
             let digits = if inputs.scene.lights.len() > 1 {
                 random.next4()
@@ -47,8 +54,9 @@ pub fn direct<'a>(
                 [0.0; 4]
             };
             asks = inputs.scene.features.dielectric
-                && inputs.config.asks_behind_glass(iteration)
-                && (iteration.is_multiple_of(ASKS_EVERY) || photons_of(statistics) < SEASONED);
+                && turn.path == 0
+                && inputs.config.asks_behind_glass(turn.iteration)
+                && (turn.iteration.is_multiple_of(ASKS_EVERY) || photons_of(statistics) < SEASONED);
             let (sampled, behind_glass) =
                 sample_direct(inputs, point, seen.reflector(slot), sample, digits, asks, &random);
             if behind_glass {
@@ -58,11 +66,15 @@ pub fn direct<'a>(
                 radiance += sampled;
             }
         }
+        radiance /= f64::from(turn.paths);
         if radiance.is_finite() {
             let (unbent_before, asked_before) = (sum.high[3], sum.low[3]);
             (sum.high, sum.low) = to_two_floats(from_two_floats(sum.high, sum.low) + radiance.extend(0.0));
             sum.high[3] = unbent_before + unbent as f32;
             sum.low[3] = asked_before + f32::from(asks);
+            for (of_sequence, channel) in of_sequence.iter_mut().zip(radiance.to_array()) {
+                *of_sequence += channel as f32;
+            }
         } else {
             counts.add_non_finite(1);
         }

@@ -36,7 +36,7 @@ mod vector;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-pub use crate::random::{PathKind, Random, pcg4d};
+pub use crate::random::{CameraTurn, PathKind, Random, pcg4d};
 pub use camera::{Seen, SeenSlice, camera};
 pub use coverage::coverage;
 pub use demand::{Demand, Progress, demand, grid_shape, shell_radii};
@@ -47,10 +47,10 @@ pub use intersect::{Hit, PlacedTriangle, Ray, is_blocked, nearest_hit};
 pub use photons::{Batch, Traced, compact, photons};
 pub use primitives::{scan, sort};
 pub use renderer::Renderer;
-pub use resolve::resolve;
+pub use resolve::{resolve, resolve_sequences};
 pub use sampling::{decode_direction, encode_direction};
 pub use tiles::pixel_of;
-pub use update::{fit_radius, radii, reset, update};
+pub use update::{GatheredWith, fit_radius, radii, reset, update};
 
 use crate::config::RenderConfig;
 use crate::emission::Table;

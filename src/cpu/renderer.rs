@@ -5,16 +5,17 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::{
-    Batch, Counts, Demand, Inputs, Progress, Seen, camera, compact, coverage, demand, direct, fit_radius,
-    gather_kd_tree, gather_naive, grid_shape, photons, radii, reset, resolve, shell_radii, update,
+    Batch, Counts, Demand, GatheredWith, Inputs, Progress, Seen, camera, compact, coverage, demand, direct, fit_radius,
+    gather_kd_tree, gather_naive, grid_shape, photons, radii, reset, resolve, resolve_sequences, shell_radii, update,
 };
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, demand_floor2, settings};
-use crate::config::{EmissionChoice, Estimator, Limits, RenderConfig, Sizes};
+use crate::config::{EmissionChoice, Estimator, Limits, RenderConfig, SEQUENCES, Sizes};
 use crate::emission::{Aim, PILOT_ROUNDS, is_learned_from, pilot_iteration};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
 use crate::layout::{Coverage, DirectSum, Gathered, Settings, Statistics};
 use crate::radius;
+use crate::random::CameraTurn;
 use crate::record::{Launch, Run};
 use crate::scene::{Camera, PackedScene};
 
@@ -34,6 +35,8 @@ pub struct Renderer {
     statistics: Vec<Statistics>,
     gathered: Vec<Gathered>,
     direct_sums: Vec<DirectSum>,
+    /// Of each slot, for each of [`SEQUENCES`].
+    sequence_sums: Vec<[f32; 4]>,
     coverage: Vec<Coverage>,
     /// Median of the initial radii.
     radius: f32,
@@ -86,6 +89,7 @@ impl Renderer {
             statistics: vec![reset(0.0); receivers],
             gathered: vec![Gathered::zeroed(); receivers],
             direct_sums: vec![DirectSum::zeroed(); slots],
+            sequence_sums: vec![[0.0; 4]; SEQUENCES as usize * slots],
             coverage: vec![Coverage::zeroed(); receivers],
             radius: 0.0,
             photon_flux: None,
@@ -129,7 +133,7 @@ impl Renderer {
     /// radii.
     fn prepare(&mut self) -> Result<()> {
         let counts = Counts::default();
-        let seen = camera(&self.inputs(), 0, &counts);
+        let seen = camera(&self.inputs(), CameraTurn::FIRST, &counts);
         let mut of_pilot = vec![reset(0.0); self.statistics.len()];
         let radii2 = radii(&self.settings, &seen, &mut of_pilot);
         let demand = self.demand(&seen, &radii2);
@@ -224,11 +228,11 @@ impl Renderer {
 impl Backend for Renderer {
     fn iterate(&mut self) -> Result<Run> {
         let iteration = self.iterations;
-        if self.aim.is_some() && self.config.block_of(iteration) == iteration {
+        if self.aim.is_some() && self.config.begins_sequences(iteration) {
             if iteration > 0 {
                 self.settings.demand_floor2 = demand_floor2(&self.resolve_all()?);
             }
-            // What an iteration learns changes no other one of its block.
+            // What an iteration learns changes no sequence.
             if let Some(aim) = &mut self.aim {
                 aim.update();
             }
@@ -246,8 +250,12 @@ impl Backend for Renderer {
             made: self.made,
             run: Run::default(),
         };
+        let slots = self.direct_sums.len();
+        let sequence = (iteration % SEQUENCES) as usize * slots;
+        let sequence = sequence..sequence + slots;
+        let turn = CameraTurn::that_gathers(&self.config, iteration);
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
-            self.seen = clock.time("camera", || camera(&inputs, iteration, &counts));
+            self.seen = clock.time("camera", || camera(&inputs, turn, &counts));
         }
         let radii2 = clock.time("radii", || radii(&self.settings, &self.seen, &mut self.statistics));
         let demand = clock.time("demand", || self.demand(&self.seen, &radii2));
@@ -271,9 +279,10 @@ impl Backend for Renderer {
             }
             self.counters.photons_stored += photons.len() as u64;
         }
+        let sequence = &mut self.sequence_sums[sequence];
         clock.time("direct", || {
             let (statistics, sums) = (&self.statistics, &mut self.direct_sums);
-            direct(&inputs, iteration, &self.seen, statistics, &counts, sums);
+            direct(&inputs, turn, &self.seen, statistics, &counts, sums, sequence);
         });
         if self.config.estimator == Estimator::Sppm {
             let points = &self.seen.points;
@@ -288,16 +297,29 @@ impl Backend for Renderer {
                 )
             });
         }
+        let gathered_with = GatheredWith {
+            radii2: &radii2,
+            coverage: &self.coverage,
+            photons: self.config.photons,
+            alpha: self.config.alpha,
+        };
         clock.time("update", || {
             update(
                 &self.seen.points,
-                &radii2,
-                self.config.alpha,
+                gathered_with,
                 &counts,
                 &mut self.gathered,
                 &mut self.statistics,
+                sequence,
             );
         });
+        for turn in turn.others() {
+            self.seen = clock.time("camera", || camera(&inputs, turn, &counts));
+            clock.time("direct", || {
+                let (statistics, sums) = (&self.statistics, &mut self.direct_sums);
+                direct(&inputs, turn, &self.seen, statistics, &counts, sums, sequence);
+            });
+        }
         if let Some(aim) = &mut self.aim
             && is_learned_from(&self.config, iteration)
         {
@@ -323,7 +345,13 @@ impl Backend for Renderer {
             iterations,
             emitted,
         );
-        Ok(Resolved::from_film(self.config.resolution, &film, behind_glass))
+        let sequences = resolve_sequences(&self.settings, &self.sequence_sums, iterations);
+        Ok(Resolved::from_film(
+            self.config.resolution,
+            &film,
+            behind_glass,
+            sequences,
+        ))
     }
 
     fn iterations(&self) -> u32 {

@@ -7,6 +7,7 @@ use glam::{DVec3, DVec4};
 
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{from_two_float, from_two_floats, word, xyz};
+use crate::config::SEQUENCES;
 use crate::layout::{BehindGlass, Coverage, DirectSum, NO_OBJECT, Settings, Statistics, VisiblePoint};
 
 /// The part of the discs that can have photons; 1 where nothing is known of it.
@@ -16,6 +17,25 @@ pub(super) fn share_of(coverage: &Coverage) -> f64 {
     } else {
         1.0
     }
+}
+
+/// The pictures of each sequence alone, row by row, one after another, as the slots' `sums` of the sequences have them.
+pub fn resolve_sequences(settings: &Settings, sums: &[[f32; 4]], iterations: u32) -> Vec<[f32; 4]> {
+    let [width, height] = settings.resolution.map(|side| side as usize);
+    let slots_per_pixel = settings.slots_per_pixel as usize;
+    let mut film = vec![[0.0; 4]; SEQUENCES as usize * width * height];
+    let pictures = film.chunks_mut(width * height);
+    let sequences = sums.chunks(pixel_slots(settings) * slots_per_pixel);
+    for (sequence, (picture, sums)) in (0..).zip(pictures.zip(sequences)) {
+        let iterations = f64::from((iterations + SEQUENCES - 1 - sequence) / SEQUENCES);
+        for (pixel_slot, slots) in (0..).zip(sums.chunks(slots_per_pixel)) {
+            if let Some([x, y]) = pixel_of(settings.resolution, pixel_slot) {
+                let sum: DVec4 = slots.iter().map(|sum| DVec4::from(sum.map(f64::from))).sum();
+                picture[y as usize * width + x as usize] = (sum / iterations.max(1.0)).as_vec4().to_array();
+            }
+        }
+    }
+    film
 }
 
 /// Photons that a visible point has accepted, as far as 32 bits hold. What may have brought light behind glass are those of

@@ -1,11 +1,15 @@
 //! The statistics of the visible points.
 
+use std::f64::consts::PI;
+
 use bytemuck::Zeroable;
+use glam::DVec4;
 use rayon::prelude::*;
 
+use super::resolve::share_of;
 use super::vector::{from_two_float, from_two_floats, mean, to_two_float, to_two_floats, word, xyz};
 use super::{Counts, Seen};
-use crate::layout::{Gathered, NO_OBJECT, Settings, Statistics, VisiblePoint};
+use crate::layout::{Coverage, Gathered, NO_OBJECT, Settings, Statistics, VisiblePoint};
 
 /// R² where it stops shrinking, and τ with it: far below what positions resolve, far above the smallest f32.
 const SMALLEST_RADIUS2: f64 = 1e-24;
@@ -75,44 +79,70 @@ pub fn fit_radius(
     });
 }
 
-/// Takes an iteration's photons, gathered within `radii2`, into the statistics of each slot for each photon map (equations 2
-/// and 3) and clears them for the next one.
+/// What the photons of an iteration have been gathered with.
+#[derive(Debug, Clone, Copy)]
+pub struct GatheredWith<'a> {
+    /// R² of each slot for each photon map.
+    pub radii2: &'a [f32],
+    /// Likewise.
+    pub coverage: &'a [Coverage],
+    /// Paths of the iteration.
+    pub photons: u32,
+    /// Eq. 2's α.
+    pub alpha: f32,
+}
+
+/// Takes an iteration's photons into the statistics of each slot for each photon map (equations 2 and 3) and clears them for
+/// the next one; and what they add to the picture into the slots' `sums` of the iteration's sequence.
 pub fn update(
     visible_points: &[VisiblePoint],
-    radii2: &[f32],
-    alpha: f32,
+    with: GatheredWith<'_>,
     counts: &Counts,
     gathered: &mut [Gathered],
     statistics: &mut [Statistics],
+    sums: &mut [[f32; 4]],
 ) {
-    let receivers = statistics.par_iter_mut().zip(gathered).zip(radii2).enumerate();
-    receivers.for_each(|(index, ((statistics, gathered), &radius2_here))| {
-        let point = &visible_points[index % visible_points.len()];
-        if word(point.position_object) == NO_OBJECT {
-            return;
-        }
-        let weight = xyz(point.weight_normal);
-        let curvature = mean(weight) * curvature(gathered, f64::from(radius2_here));
-        // τ is that of a disc of R. A smaller one has been gathered from where that has a bound.
-        let larger = f64::from(statistics.radius2_high) / f64::from(radius2_here);
-        let flux = (weight * xyz(gathered.flux_count)).extend(curvature) * larger;
-        let new_photons = word(gathered.flux_count);
-        *gathered = Gathered::zeroed();
-        if !flux.is_finite() {
-            counts.add_non_finite(1);
-        } else if new_photons > 0 {
-            let alpha = f64::from(alpha);
-            let accepted = statistics.accepted();
-            let (n, m) = (alpha * accepted as f64, f64::from(new_photons));
-            let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
-            let ratio = (n + alpha * m) / (n + m);
-            let ratio = if radius2 * ratio < SMALLEST_RADIUS2 { 1.0 } else { ratio };
-            let radius2 = radius2 * ratio;
-            let tau = (from_two_floats(statistics.flux_high, statistics.flux_low) + flux) * ratio;
-            let accepted = accepted + u64::from(new_photons);
-            (statistics.radius2_high, statistics.radius2_low) = to_two_float(radius2);
-            (statistics.flux_high, statistics.flux_low) = to_two_floats(tau);
-            (statistics.accepted_low, statistics.accepted_high) = (accepted as u32, (accepted >> 32) as u32);
-        }
-    });
+    let slots = visible_points.len();
+    let maps = statistics.chunks_mut(slots).zip(gathered.chunks_mut(slots));
+    let maps = maps.zip(with.radii2.chunks(slots).zip(with.coverage.chunks(slots)));
+    for ((statistics, gathered), (radii2, coverage)) in maps {
+        let receivers = statistics.par_iter_mut().zip(gathered);
+        let receivers = receivers.zip(radii2.par_iter().zip(coverage));
+        let receivers = receivers.zip(visible_points.par_iter().zip(&mut *sums));
+        receivers.for_each(|(((statistics, gathered), (&radius2, coverage)), (point, sum))| {
+            if word(point.position_object) == NO_OBJECT {
+                return;
+            }
+            let weight = xyz(point.weight_normal);
+            let curvature = mean(weight) * curvature(gathered, f64::from(radius2));
+            // τ is that of a disc of R. A smaller one has been gathered from where that has a bound.
+            let larger = f64::from(statistics.radius2_high) / f64::from(radius2);
+            let flux = (weight * xyz(gathered.flux_count)).extend(curvature) * larger;
+            let new_photons = word(gathered.flux_count);
+            *gathered = Gathered::zeroed();
+            if !flux.is_finite() {
+                counts.add_non_finite(1);
+            } else if new_photons > 0 {
+                let area = PI * f64::from(statistics.radius2_high) * share_of(coverage);
+                let radiance = flux / f64::from(with.photons) / area;
+                *sum = (DVec4::from(sum.map(f64::from)) + radiance).as_vec4().to_array();
+                take(flux, new_photons, f64::from(with.alpha), statistics);
+            }
+        });
+    }
+}
+
+/// Equations 2 and 3.
+fn take(flux: DVec4, new_photons: u32, alpha: f64, statistics: &mut Statistics) {
+    let accepted = statistics.accepted();
+    let (n, m) = (alpha * accepted as f64, f64::from(new_photons));
+    let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
+    let ratio = (n + alpha * m) / (n + m);
+    let ratio = if radius2 * ratio < SMALLEST_RADIUS2 { 1.0 } else { ratio };
+    let radius2 = radius2 * ratio;
+    let tau = (from_two_floats(statistics.flux_high, statistics.flux_low) + flux) * ratio;
+    let accepted = accepted + u64::from(new_photons);
+    (statistics.radius2_high, statistics.radius2_low) = to_two_float(radius2);
+    (statistics.flux_high, statistics.flux_low) = to_two_floats(tau);
+    (statistics.accepted_low, statistics.accepted_high) = (accepted as u32, (accepted >> 32) as u32);
 }

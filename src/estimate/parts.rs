@@ -14,8 +14,6 @@ pub(super) struct Parts {
     pub pixels: Vec<OfPixel>,
     /// relMSE's denominator beside the square.
     pub floor: f64,
-    /// What is left of the noise and of the bias since the last picture.
-    pub fallen: [f64; 2],
     /// Whether pixels are seen through their centres alone.
     pub sees_centres: bool,
     /// Radiance behind glass that each pixel may lack; of no pixel where nothing is known of it.
@@ -47,12 +45,12 @@ impl Parts {
     /// Part of relMSE of the noise.
     pub fn relative_noise2(&self) -> f64 {
         let parts = self.pixels.iter().flat_map(|pixel| pixel.relative_noise2);
-        parts.sum::<f64>() * self.per_sample() * self.fallen[0]
+        parts.sum::<f64>() * self.per_sample()
     }
 
     /// Part of relMSE of the bias.
     pub fn relative_bias2(&self) -> f64 {
-        self.relative_of(&self.bias2()) * self.fallen[1]
+        self.relative_of(&self.bias2())
     }
 
     fn bias2(&self) -> Vec<f64> {
@@ -82,7 +80,7 @@ impl Parts {
             relative2 += parts.iter().sum::<f64>() * self.per_sample();
             count += 1;
         }
-        (relative2 * self.fallen[0], f64::from(count) / self.pixels.len() as f64)
+        (relative2, f64::from(count) / self.pixels.len() as f64)
     }
 
     /// Of all parts together, each pixel's squared error.
@@ -94,7 +92,7 @@ impl Parts {
             .into_iter()
             .map(|(sum, count)| sum.max(0.0) / count as f64)
             .collect();
-        let bias_scale = scale(self.relative_of(&bias2), self.relative_of(&around)) * self.fallen[1];
+        let bias_scale = scale(self.relative_of(&bias2), self.relative_of(&around));
         let mut aliasing2 = self.aliasing2().0;
         let whole = aliasing2.as_flattened().iter().sum();
         aliasing2
@@ -108,7 +106,7 @@ impl Parts {
             .map(|(((pixel, bias2), aliasing2), missing)| {
                 let share2 = share2(&pixel.values);
                 [0, 1, 2].map(|channel| {
-                    pixel.noise2[channel] * self.fallen[0]
+                    pixel.noise2[channel]
                         + bias2 * share2[channel] * bias_scale
                         + aliasing2[channel] * aliasing_scale
                         + missing.powi(2)

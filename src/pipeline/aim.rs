@@ -46,9 +46,9 @@ impl Renderer {
         }
     }
 
-    /// Between two blocks of iterations paths may be aimed anew: what an iteration learns changes no other one of its block.
+    /// Where sequences begin anew paths may be aimed anew: what an iteration learns changes no sequence.
     pub(super) fn begin_block(&mut self, iteration: u32) -> Result<()> {
-        if self.aim.is_none() || self.config.block_of(iteration) != iteration {
+        if self.aim.is_none() || !self.config.begins_sequences(iteration) {
             return Ok(());
         }
         if iteration > 0 {

@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::gather::{METHODS, default_method, grid_sizes};
 use crate::gpu::Device;
 use crate::layout::{GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Settings, StatusCounters};
+use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
 use crate::scene::{Camera, PackedScene, SceneFeatures};
 use crate::stage::BufferId;
@@ -204,7 +205,7 @@ impl Renderer {
         self.fit_photon_buffers()?;
         let (run, _) = self.run_until_it_fits(|stages| {
             let mut recording = reporting();
-            stages.camera(0, &mut recording);
+            stages.camera(CameraTurn::FIRST, &mut recording);
             stages.radii(&mut recording);
             stages.demand(0, &mut recording);
             stages.photons(0, 0, &mut recording);
@@ -225,7 +226,9 @@ impl Renderer {
         self.counters.photons_accepted = status.photons_accepted();
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
         let behind_glass = self.device.download(BufferId::GlassFilm, None)?;
-        Ok((run, Resolved::from_film(self.config.resolution, &film, behind_glass)))
+        let sequences = self.device.download(BufferId::SequenceFilm, None)?;
+        let resolved = Resolved::from_film(self.config.resolution, &film, behind_glass, sequences);
+        Ok((run, resolved))
     }
 
     /// Gathers the photons at hand with any method of a device; what was gathered before is forgotten. Returns what it

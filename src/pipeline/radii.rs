@@ -5,6 +5,7 @@ use super::stages::reporting;
 use crate::backend::Counters;
 use crate::error::Result;
 use crate::layout::{Photon, Statistics, VisiblePoint};
+use crate::random::CameraTurn;
 use crate::record::Recording;
 use crate::scene::PackedScene;
 use crate::stage::{BufferId, StageDesc};
@@ -18,7 +19,7 @@ impl Renderer {
         self.reset()?;
         self.run_until_it_fits(|stages| {
             let mut recording = reporting();
-            stages.camera(0, &mut recording);
+            stages.camera(CameraTurn::FIRST, &mut recording);
             let (order, _) = stages.method();
             order(stages.sizes, &mut recording);
             stages.radii(&mut recording);
@@ -85,6 +86,7 @@ impl Renderer {
     fn reset(&mut self) -> Result<()> {
         let mut recording = reporting();
         recording.fill(BufferId::DirectSums, 0);
+        recording.fill(BufferId::SequenceSums, 0);
         recording.fill(BufferId::CoverageOf, 0);
         recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.receivers()));
         self.run(&recording).map(|_| ())

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::config::{Accel, Direct, Estimator, RenderConfig, Sizes, TriangleTest};
 use crate::gather::{METHODS, Record, default_method, grid_sizes, scan};
+use crate::random::CameraTurn;
 use crate::record::Recording;
 use crate::scene::SceneFeatures;
 use crate::shaders;
@@ -38,8 +39,9 @@ impl Stages<'_> {
     pub fn iteration(&self, iteration: u32) -> Recording {
         let mut recording = reporting();
         let (order, gather) = self.method();
+        let turn = CameraTurn::that_gathers(self.config, iteration);
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
-            self.camera(iteration, &mut recording);
+            self.camera(turn, &mut recording);
             order(self.sizes, &mut recording);
         }
         self.radii(&mut recording);
@@ -48,20 +50,24 @@ impl Stages<'_> {
             self.photons(iteration, batch, &mut recording);
             gather(self.sizes, &mut recording);
         }
-        let turn = [iteration, self.config.block_of(iteration)];
-        let mut direct = self.ray_stage(&shaders::DIRECT, self.sizes.slots());
-        let asks = u32::from(self.features.dielectric && self.config.asks_behind_glass(iteration));
-        direct.constants.to_mut().push(("ASKS_BEHIND_GLASS", asks));
-        recording.dispatch(direct.push(turn));
+        let asks = self.features.dielectric && self.config.asks_behind_glass(iteration);
+        self.direct(turn, asks, &mut recording);
         // The paper has no such correction.
         if self.config.estimator == Estimator::Sppm {
-            recording.dispatch(self.ray_stage(&shaders::COVERAGE, self.sizes.receivers()).push([
-                turn[0],
-                turn[1],
-                self.config.coverage_points(iteration),
-            ]));
+            recording.dispatch(
+                self.ray_stage(&shaders::COVERAGE, self.sizes.receivers())
+                    .push([iteration, self.config.coverage_points(iteration)]),
+            );
         }
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, self.sizes.receivers()));
+        recording.dispatch(
+            StageDesc::new(&shaders::UPDATE, self.sizes.slots())
+                .push([iteration, (self.config.photons as f32).to_bits()]),
+        );
+        // After the photons: an iteration that has to be done again stops before it has added anything.
+        for turn in turn.others() {
+            self.camera(turn, &mut recording);
+            self.direct(turn, false, &mut recording);
+        }
         recording
     }
 
@@ -78,10 +84,19 @@ impl Stages<'_> {
         method_stages(self.config.gather.unwrap_or_else(default_method))
     }
 
-    /// Finding the visible points.
-    pub(super) fn camera(&self, iteration: u32, recording: &mut Recording) {
-        let turn = [iteration, self.config.block_of(iteration)];
-        recording.dispatch(self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots).push(turn));
+    /// Finding the visible points: in an iteration with this one of so many paths of each pixel.
+    pub(super) fn camera(&self, turn: CameraTurn, recording: &mut Recording) {
+        recording.dispatch(
+            self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots)
+                .push(turn.words()),
+        );
+    }
+
+    /// What they see of the lights, and whether they ask for lights behind glass.
+    fn direct(&self, turn: CameraTurn, asks: bool, recording: &mut Recording) {
+        let mut direct = self.ray_stage(&shaders::DIRECT, self.sizes.slots());
+        direct.constants.to_mut().push(("ASKS_BEHIND_GLASS", u32::from(asks)));
+        recording.dispatch(direct.push(turn.words()));
     }
 
     /// The radii that the visible points gather within, and the grids that suit them.
@@ -116,7 +131,7 @@ impl Stages<'_> {
         recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([
             iteration,
             block,
-            self.config.first_of_block(iteration),
+            self.config.first_of_sequence(iteration),
             paths.start,
             paths.len() as u32,
         ]));

@@ -23,7 +23,7 @@ fn on_device(bench: &mut Bench, points: &[VisiblePoint], radii2: &[f32], statist
         ("SAMPLER", bench.config.sampler as u32),
         ("INSTANCED", u32::from(bench.scene.features.instanced)),
     ];
-    let push = [0, 0, bench.config.coverage_points(0)];
+    let push = [0, bench.config.coverage_points(0)];
     recording.dispatch(
         StageDesc::new(&shaders::COVERAGE, radii2.len() as u32)
             .constants(constants)

@@ -3,9 +3,9 @@
 use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Probe, RenderConfig};
-use ppm_vk::cpu::{self, Counts, Seen};
+use ppm_vk::cpu::{self, Counts, GatheredWith, Seen};
 use ppm_vk::gather::{self, METHODS};
-use ppm_vk::layout::{Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
+use ppm_vk::layout::{Coverage, Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
 use ppm_vk::record::Recording;
 use ppm_vk::scene::PackedScene;
 use ppm_vk::shaders;
@@ -74,11 +74,16 @@ fn assert_methods_agree_on(
     let mut updated = statistics.to_vec();
     cpu::update(
         points,
-        &radii2,
-        bench.config.alpha,
+        GatheredWith {
+            radii2: &radii2,
+            coverage: &vec![Coverage::zeroed(); radii2.len()],
+            photons: bench.config.photons,
+            alpha: bench.config.alpha,
+        },
         &Counts::default(),
         &mut expected.clone(),
         &mut updated,
+        &mut vec![[0.0; 4]; points.len()],
     );
 
     bench.upload(BufferId::VisiblePoints, points);
@@ -103,7 +108,8 @@ fn assert_methods_agree_on(
 
         let mut recording = Recording::new();
         recording.fill(BufferId::Status, 0);
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, radii2.len() as u32));
+        let push = [0, (bench.config.photons as f32).to_bits()];
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, points.len() as u32).push(push));
         bench
             .renderer
             .run(&recording)

@@ -1,13 +1,16 @@
 //! What a driver's limits must not do to a picture. Mesa's llvmpipe, for years, has ended all loops of an invocation
 //! together after 65,535 iterations, without a word; the gathers have a test of that too.
 
+use glam::DVec3;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Accel, Direct, EmissionChoice, RenderConfig};
-use ppm_vk::cpu::{self, Batch, Counts};
+use ppm_vk::cpu::{self, Batch, CameraTurn, Counts};
 use ppm_vk::gpu::Device;
 use ppm_vk::layout::{DirectSum, Statistics, VisiblePoint};
 use ppm_vk::pipeline::Renderer;
-use ppm_vk::stage::BufferId;
+use ppm_vk::record::Recording;
+use ppm_vk::shaders;
+use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::agreement::relative_difference;
 use super::bench::{Bench, small, xyz};
@@ -46,6 +49,7 @@ fn an_iteration_that_is_done_again_counts_once() {
     // Rays that test 4,000 triangles take more iterations of loops than some drivers give to two paths of a lane: there
     // the iteration is done again, one path a lane. What is seen directly is summed up whatever the photons do.
     let config = RenderConfig {
+        // Eight camera paths a pixel.
         resolution: [16, 16],
         photons: 4200,
         accel: Accel::Brute,
@@ -54,14 +58,28 @@ fn an_iteration_that_is_done_again_counts_once() {
         ..small()
     };
     let mut bench = Bench::new("cornell-spheres", config);
-    let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
     let sums: Vec<DirectSum> = bench.download(BufferId::DirectSums);
     let repeated = bench.renderer.counters().repeated_iterations;
-    for (slot, (point, sum)) in points.iter().zip(&sums).enumerate() {
-        let (seen, summed) = (xyz(point.emitted_normal), xyz(sum.high) + xyz(sum.low));
-        assert_eq!(
-            summed, seen,
-            "slot {slot} after one iteration, done again {repeated} times: sum, radiance seen"
+    let mut expected = vec![DVec3::ZERO; sums.len()];
+    let first = CameraTurn::that_gathers(&bench.config, 0);
+    for turn in std::iter::once(first).chain(first.others()) {
+        let mut recording = Recording::new();
+        let constants = vec![("BRUTE_FORCE", 1), ("MIRRORS", 1), ("DIELECTRICS", 1)];
+        let camera = StageDesc::new(&shaders::CAMERA, bench.renderer.sizes().pixel_slots);
+        recording.dispatch(camera.constants(constants).push(turn.words()));
+        bench.renderer.run(&recording).expect("a camera stage");
+        for (sum, point) in expected
+            .iter_mut()
+            .zip(bench.download::<VisiblePoint>(BufferId::VisiblePoints))
+        {
+            *sum += xyz(point.emitted_normal) / f64::from(turn.paths);
+        }
+    }
+    for (slot, (sum, seen)) in sums.iter().zip(expected).enumerate() {
+        let summed = xyz(sum.high) + xyz(sum.low);
+        assert!(
+            summed.distance(seen) <= 1e-6 * seen.length(),
+            "slot {slot} after one iteration, done again {repeated} times: sum {summed}, radiance seen {seen}"
         );
     }
 }

@@ -93,7 +93,7 @@ fn the_kd_tree_finds_what_testing_every_photon_finds() {
     let renderer = Renderer::new(&scene, &loaded.cameras[0], config.clone()).expect("a renderer");
     let inputs = inputs(&scene, renderer.settings(), &config);
     let counts = Counts::default();
-    let points = cpu::camera(&inputs, 0, &counts).points;
+    let points = cpu::camera(&inputs, cpu::CameraTurn::FIRST, &counts).points;
     let batch = Batch {
         iteration: 0,
         first_path: 0,

@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Estimator, RenderConfig};
-use ppm_vk::cpu::{self, Counts};
+use ppm_vk::cpu::{self, Counts, GatheredWith};
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{
     BehindGlass, Coverage, DirectSum, Gathered, GridShape, NO_OBJECT, Photon, Settings, ShellRadii, Statistics,
@@ -14,7 +14,7 @@ use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::agreement::{Agreement, relative_difference};
-use super::bench::{Bench, photon, random_numbers, small, visible_point};
+use super::bench::{Bench, photon, random_numbers, scene, small, visible_point};
 
 /// Values of 1e-6 relative: the device keeps two f32 of each, 48 bits, but rounds the factors of eq. 2 to f32.
 const TOLERANCE: f64 = 1e-6;
@@ -72,7 +72,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     for _ in 0..500 {
         recording.dispatch(StageDesc::new(&shaders::RADII, 64));
         naive(bench.renderer.sizes(), &mut recording);
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, 64));
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, 64).push([0, 1f32.to_bits()]));
     }
     for _ in 0..ITERATIONS / 500 {
         bench.renderer.run(&recording).expect("a run");
@@ -82,16 +82,23 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     let before = statistics.clone();
     let mut expected = statistics;
     let mut gathered = vec![Gathered::zeroed(); 64];
+    let coverage = vec![Coverage::zeroed(); 64];
+    let mut sums = vec![[0.0; 4]; 64];
     for _ in 0..ITERATIONS {
         let radii2: Vec<f32> = expected.iter().map(|s: &Statistics| s.radius2_high).collect();
         cpu::gather_naive(&points, &radii2, &photons, &mut gathered);
         cpu::update(
             &points,
-            &radii2,
-            bench.config.alpha,
+            GatheredWith {
+                radii2: &radii2,
+                coverage: &coverage,
+                photons: 1,
+                alpha: bench.config.alpha,
+            },
             &Counts::default(),
             &mut gathered,
             &mut expected,
+            &mut sums,
         );
     }
     for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
@@ -358,5 +365,62 @@ fn pictures_are_resolved_by_equation_4() {
             }
         }
         assert!(behind_glass.iter().filter(|glass| glass.radius > 0.0).count() > 20);
+        let sums: Vec<[f32; 4]> = bench.download(BufferId::SequenceSums);
+        let sequences = cpu::resolve_sequences(&bench.settings, &sums, iterations);
+        for (index, (found, expected)) in resolved.sequences.iter().zip(&sequences).enumerate() {
+            for (found, expected) in found.iter().zip(expected) {
+                let difference = relative_difference((*found).into(), (*expected).into());
+                assert!(
+                    difference < TOLERANCE,
+                    "{estimator:?}, pixel {index} of the sequences: {found} on the device, {expected} on the CPU"
+                );
+            }
+        }
+    }
+}
+
+/// Each iteration's part of the picture is in the picture of its sequence, whatever has become of R since. What is known of a
+/// disc's cover, by which the picture alone is divided anew, changes: of that estimator the picture as a whole is the same.
+#[test]
+fn the_pictures_of_the_sequences_are_together_the_picture() {
+    const ITERATIONS: u32 = 6;
+    for (name, estimator) in [
+        ("cornell-spheres", Estimator::Sppm),
+        ("glossy", Estimator::Sppm),
+        ("cornell-spheres", Estimator::Ppm),
+    ] {
+        let config = RenderConfig { estimator, ..small() };
+        let mut bench = Bench::new(name, config.clone());
+        let mut on_cpu = cpu::Renderer::new(&bench.scene, &scene(name).cameras[0], config).expect("a renderer");
+        let backends: [(&str, &mut dyn Backend); 2] = [("device", &mut bench.renderer), ("CPU", &mut on_cpu)];
+        for (backend, renderer) in backends {
+            while renderer.iterations() < ITERATIONS {
+                renderer.iterate().expect("an iteration");
+            }
+            let resolved = renderer.resolve_all().expect("a picture");
+            let pixels = resolved.image.pixels();
+            let mut agreement = Agreement::default();
+            let mut sums = [0.0; 2];
+            for (pixel, picture) in pixels.iter().enumerate() {
+                for (channel, &value) in picture.iter().enumerate() {
+                    let of_sequence = |sequence: usize| -> f64 {
+                        let iterations = [2.0, 2.0, 1.0, 1.0][sequence];
+                        iterations * f64::from(resolved.sequences[sequence * pixels.len() + pixel][channel])
+                    };
+                    let together = (0..4).map(of_sequence).sum::<f64>() / f64::from(ITERATIONS);
+                    sums = [sums[0] + together, sums[1] + f64::from(value)];
+                    let difference = relative_difference(together, value.into());
+                    agreement.note(difference < 1e-5 || estimator == Estimator::Sppm, || {
+                        format!("pixel {pixel}: {together} by the sequences, {value} in the picture")
+                    });
+                }
+            }
+            let ratio = sums[0] / sums[1];
+            assert!(
+                (ratio - 1.0).abs() < 0.01,
+                "{name}, {estimator:?}, {backend}: {ratio} of the picture's light"
+            );
+            agreement.assert(&format!("{name}, {estimator:?}, {backend}"), 1.0, 10_000);
+        }
     }
 }

@@ -8,7 +8,7 @@
 use bytemuck::Zeroable;
 use half::f16;
 use ppm_vk::config::{Direct, Estimator, RenderConfig, Sampler};
-use ppm_vk::cpu::{self, Counts, Seen};
+use ppm_vk::cpu::{self, CameraTurn, Counts, Seen};
 use ppm_vk::layout::{DirectSum, Gloss, Light, Statistics};
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
@@ -16,6 +16,12 @@ use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, object, small, xyz};
+
+/// The last of the first iteration's paths of a pixel, whose visible points the buffers hold.
+fn last_turn(config: &RenderConfig) -> CameraTurn {
+    let first = CameraTurn::that_gathers(config, 0);
+    first.others().last().unwrap_or(first)
+}
 
 /// Angle between two encoded directions, rad.
 fn angle(a: f32, b: f32) -> f64 {
@@ -52,7 +58,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize) {
         points: expected,
         gloss: expected_gloss,
         footprints: expected_footprints,
-    } = cpu::camera(&bench.inputs(), 0, &counts);
+    } = cpu::camera(&bench.inputs(), last_turn(&bench.config), &counts);
     assert_eq!(found.len(), expected.len(), "{what}: slots");
     let (mut places, mut seen) = (Agreement::default(), Agreement::default());
     for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
@@ -128,7 +134,7 @@ fn a_picture_that_cuts_its_tiles_fills_the_same_slots() {
 }
 
 /// Runs the stage `direct` over cleared sums; returns the radiance of each slot.
-fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
+fn direct_on_device(bench: &mut Bench, turn: CameraTurn) -> Vec<DirectSum> {
     let mut recording = Recording::new();
     recording.fill(BufferId::DirectSums, 0);
     let slots = bench.renderer.sizes().slots();
@@ -143,7 +149,7 @@ fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
     recording.dispatch(
         StageDesc::new(&shaders::DIRECT, slots)
             .constants(constants)
-            .push([0u32; 2]),
+            .push(turn.words()),
     );
     bench.renderer.run(&recording).expect("a run");
     bench.download(BufferId::DirectSums)
@@ -152,19 +158,43 @@ fn direct_on_device(bench: &mut Bench) -> Vec<DirectSum> {
 /// What the device and the CPU say of the light behind glass at the same visible points.
 #[test]
 fn light_behind_glass_agrees_at_the_same_visible_points() {
-    for (name, least) in [("cornell-spheres", 100), ("pool", 2000), ("cornell-spheres, lit", 30)] {
+    let cases = [
+        ("cornell-spheres", 0, 100),
+        ("cornell-spheres", 5, 50),
+        ("pool", 0, 2000),
+        ("pool", 5, 1000),
+        ("cornell-spheres, lit", 0, 30),
+    ];
+    for (name, iteration, least) in cases {
         let mut bench = Bench::new(name, small());
         let seen = bench.seen();
-        // Those who have photons don't ask but now and then; in the first iteration all do.
-        let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
-        let found = direct_on_device(&mut bench);
+        // In the first iteration all ask; later those who have enough photons in the last map don't.
+        let mut statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+        for (receiver, statistics) in statistics.iter_mut().enumerate() {
+            statistics.accepted_low = receiver as u32 * 7 % 32;
+        }
+        bench.upload(BufferId::StatisticsOf, &statistics);
+        let turn = CameraTurn {
+            iteration,
+            ..CameraTurn::FIRST
+        };
+        let found = direct_on_device(&mut bench, turn);
         let nothing = DirectSum {
             high: [0.0; 4],
             low: [0.0; 4],
         };
         let mut expected = vec![nothing; seen.points.len()];
         let counts = Counts::default();
-        cpu::direct(&bench.inputs(), 0, &seen, &statistics, &counts, &mut expected);
+        let mut sums = vec![[0.0; 4]; seen.points.len()];
+        cpu::direct(
+            &bench.inputs(),
+            turn,
+            &seen,
+            &statistics,
+            &counts,
+            &mut expected,
+            &mut sums,
+        );
         let mut agreement = Agreement::default();
         for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
             assert_eq!(found.low[3], expected.low[3], "{name}, slot {slot}: times asked");
@@ -184,7 +214,7 @@ fn light_behind_glass_agrees_at_the_same_visible_points() {
 fn compare_direct(bench: &mut Bench, tolerance: f64) -> Agreement {
     let seen = bench.seen();
     let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
-    let found = direct_on_device(bench);
+    let found = direct_on_device(bench, CameraTurn::FIRST);
     let mut expected = vec![
         DirectSum {
             high: [0.0; 4],
@@ -194,11 +224,12 @@ fn compare_direct(bench: &mut Bench, tolerance: f64) -> Agreement {
     ];
     cpu::direct(
         &bench.inputs(),
-        0,
+        CameraTurn::FIRST,
         &seen,
         &statistics,
         &Counts::default(),
         &mut expected,
+        &mut vec![[0.0; 4]; seen.points.len()],
     );
     let mut agreement = Agreement::default();
     for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
@@ -265,7 +296,7 @@ fn assert_same_random_numbers(sampler: Sampler) {
     };
     let mut lights = vec![light(1.0); CELLS as usize];
     for slot in 0..bench.settings.resolution[0] * bench.settings.resolution[1] {
-        let mut random = cpu::Random::of_pixel(&bench.config, cpu::PathKind::LightSample, slot, 0);
+        let mut random = cpu::Random::of_pixel(&bench.config, cpu::PathKind::LightSample, slot, CameraTurn::FIRST);
         let [u, ..] = random.next4();
         let [digits, ..] = random.next4();
         let place = (u + digits / f64::from(1 << 24)) * f64::from(CELLS);

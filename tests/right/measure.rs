@@ -85,6 +85,7 @@ pub fn measure(
 ) -> Vec<Measured> {
     assert!(iterations.is_multiple_of(BATCHES), "whole batches");
     let batch = iterations / BATCHES;
+    let (resolution, of_a_pixel) = (config.resolution, config.camera_paths());
     // Samples of one Sobol' sequence lean on each other: they spread less than their mean errs.
     let mut renderer = subject.renderer(RenderConfig {
         sampler: Sampler::Independent,
@@ -106,8 +107,9 @@ pub fn measure(
         before = sums;
     }
     let counters = renderer.counters();
+    let camera_paths = f64::from(resolution[0] * resolution[1]) * f64::from(iterations) * f64::from(of_a_pixel);
     assert!(
-        (counters.truncated_paths as f64) < ROUNDING * renderer.emitted() as f64,
+        (counters.truncated_paths as f64) < ROUNDING * (renderer.emitted() as f64 + camera_paths),
         "{counters:?}: the light of paths that the bounce limit ended is missing"
     );
     samples.into_iter().map(Measured::of).collect()

@@ -110,7 +110,7 @@ fn iterate(bench: &mut Bench, iterations: u32, arriving: impl Fn(u32) -> u32) {
     for _ in 0..at_once {
         naive(bench.renderer.sizes(), &mut recording);
         recording.dispatch(StageDesc::new(&shaders::RADII, SLOTS));
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS));
+        recording.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS).push([0, 1f32.to_bits()]));
     }
     for _ in 0..iterations / at_once {
         bench.renderer.run(&recording).expect("a run");
@@ -161,7 +161,7 @@ fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
     };
     let mut update = Recording::new();
     update.dispatch(StageDesc::new(&shaders::RADII, SLOTS));
-    update.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS));
+    update.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS).push([0, 1f32.to_bits()]));
     let mut exact = Exact::START;
     for _ in 0..ITERATIONS {
         bench.upload(BufferId::GatheredOf, &[gathered]);

@@ -1,0 +1,71 @@
+//! What a pixel has by each sequence alone.
+
+use crate::config::SEQUENCES;
+
+const COUNT: usize = SEQUENCES as usize;
+
+/// The part of the iterations that each sequence has had.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Weights([f64; COUNT]);
+
+impl Weights {
+    /// After so many iterations.
+    pub fn of(iterations: u32) -> Self {
+        let of_sequence = |sequence: usize| {
+            let own = (iterations + SEQUENCES - 1 - sequence as u32) / SEQUENCES;
+            f64::from(own) / f64::from(iterations)
+        };
+        Self(std::array::from_fn(of_sequence))
+    }
+}
+
+/// A pixel's value by the iterations of each sequence.
+pub(super) struct Spread {
+    weights: [f64; COUNT],
+    values: [f64; COUNT],
+    pub mean: f64,
+}
+
+impl Spread {
+    pub fn of(Weights(weights): Weights, values: [f64; COUNT]) -> Self {
+        let mean = weights.iter().zip(values).map(|(weight, value)| weight * value).sum();
+        Self { weights, values, mean }
+    }
+
+    /// Squared standard error of the mean, a sequence's share of it divided by what `divisor` gives for the sequence.
+    fn noise2_over(&self, divisor: impl Fn(f64, f64) -> f64) -> f64 {
+        let of_sequence =
+            |(&weight, &value): (&f64, &f64)| (weight * (value - self.mean)).powi(2) / divisor(weight, value);
+        let squares: f64 = self.weights.iter().zip(&self.values).map(of_sequence).sum();
+        squares * COUNT as f64 / (COUNT - 1) as f64
+    }
+
+    /// Squared standard error of the mean.
+    pub fn noise2(&self) -> f64 {
+        self.noise2_over(|_, _| 1.0)
+    }
+
+    /// The same over relMSE's denominator. Light that comes seldom and is bright makes a pixel far too bright: over that
+    /// value's square its error would seem small. Each sequence's part is therefore over what the other ones have of the
+    /// pixel, or the pixels around it if that is more, if it is less than what all have.
+    pub fn relative_noise2(&self, around: f64, floor: f64) -> f64 {
+        self.noise2_over(|weight, value| {
+            let others = (self.mean - weight * value) / (1.0 - weight);
+            others.max(around).min(self.mean).powi(2) + floor
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sequences_count_by_their_iterations() {
+        let spread = Spread::of(Weights::of(6), [3.0, 3.0, 0.0, 0.0]);
+        assert_eq!(spread.mean, 2.0);
+        // Two sequences of a third each are off by 1, two of a sixth by 2.
+        let expected = 4.0 / 3.0 * 4.0 / 9.0;
+        assert!((spread.noise2() - expected).abs() < 1e-12, "{}", spread.noise2());
+    }
+}
