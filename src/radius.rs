@@ -9,9 +9,9 @@ use crate::layout::{CAUSTIC, NO_OBJECT, Photon, Statistics, VisiblePoint};
 
 /// How many photons a visible point may be wanted to accept in the first iteration. The first is what the others' blur is
 /// measured against.
-const CANDIDATES: [usize; 7] = [8, 12, 16, 24, 32, 48, 64];
-/// So many are enough for a caustic: what it has is edges.
-const MOST_CAUSTIC: usize = 16;
+const OF_GLOBAL: [&[usize]; 1] = [&[8, 12, 16, 24, 32, 48, 64]];
+/// The same of caustic photons, which have edges: where the first of a list is best, it may be one of the next list.
+const OF_CAUSTICS: [&[usize]; 2] = [&[8, 12, 16], &[4, 6, 8]];
 /// The iteration whose photons the radius is found from; no render gets that far.
 pub const PILOT: u32 = u32::MAX;
 /// Rounds of shrinking the radius where photons are denser than wanted.
@@ -46,8 +46,8 @@ pub fn first(visible_points: &[VisiblePoint], footprints: &[f32], photons: &[Pho
     let (caustic, global): (Vec<&Photon>, Vec<&Photon>) = photons.iter().partition(in_map);
     [(0, global), (1, caustic)].map(|(map, photons)| {
         let most = MOST_FOOTPRINTS[map];
-        let most_photons = if map == 1 { MOST_CAUSTIC } else { usize::MAX };
-        let Automatic { footprints, photons } = automatic(visible_points, footprints, &photons, most_photons);
+        let lists: &[&[usize]] = if map == 1 { &OF_CAUSTICS } else { &OF_GLOBAL };
+        let Automatic { footprints, photons } = automatic(visible_points, footprints, &photons, lists);
         First {
             footprints: (footprints * share.sqrt()).clamp(LEAST_FOOTPRINTS, most),
             photons,
@@ -149,34 +149,38 @@ fn automatic(
     visible_points: &[VisiblePoint],
     footprints: &[f32],
     photons: &[&Photon],
-    most_photons: usize,
+    lists: &[&[usize]],
 ) -> Automatic {
-    let probes = nearest(visible_points, footprints, photons);
-    let choice = CANDIDATES
-        .into_iter()
-        .filter(|&count| count <= most_photons)
-        .filter_map(|count| Some((error2(&probes, count)?, count)))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((_, photons)) = choice else {
-        return Automatic {
-            footprints: f32::INFINITY,
-            photons: CANDIDATES[0],
-        };
+    let mut automatic = Automatic {
+        footprints: f32::INFINITY,
+        photons: lists.first().map_or(1, |candidates| candidates[0]),
     };
-    let mut ratios: Vec<f32> = probes
-        .iter()
-        .filter_map(|near| Some(near.distances2.get(photons - 1)?.sqrt() / near.footprint))
-        .collect();
-    Automatic {
-        footprints: middle(&mut ratios),
-        photons,
+    for candidates in lists {
+        let probes = nearest(visible_points, footprints, photons, candidates);
+        let errors2 = candidates
+            .iter()
+            .filter_map(|&count| Some((error2(&probes, candidates[0], count)?, count)));
+        let Some((_, photons)) = errors2.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            break;
+        };
+        let mut ratios: Vec<f32> = probes
+            .iter()
+            .filter_map(|near| Some(near.distances2.get(photons - 1)?.sqrt() / near.footprint))
+            .collect();
+        automatic = Automatic {
+            footprints: middle(&mut ratios),
+            photons,
+        };
+        if photons > candidates[0] {
+            break;
+        }
     }
+    automatic
 }
 
 /// Squared relative error of densities from the nearest `count` photons: 1/count of noise, and of blur what they differ
-/// from those of the first candidate. `None` if no probe has so many photons.
-fn error2(probes: &[Near], count: usize) -> Option<f64> {
-    let fewest = CANDIDATES[0];
+/// from those of the nearest `fewest`. `None` if no probe has so many photons.
+fn error2(probes: &[Near], fewest: usize, count: usize) -> Option<f64> {
     let ratios: Vec<f64> = probes
         .iter()
         .map(|near| &near.distances2)
@@ -194,8 +198,15 @@ fn error2(probes: &[Near], count: usize) -> Option<f64> {
 }
 
 /// Of some visible points, the nearest photons on their object, if there are as many as the first candidate.
-fn nearest(visible_points: &[VisiblePoint], footprints: &[f32], photons: &[&Photon]) -> Vec<Near> {
-    let most = CANDIDATES[CANDIDATES.len() - 1];
+fn nearest(
+    visible_points: &[VisiblePoint],
+    footprints: &[f32],
+    photons: &[&Photon],
+    candidates: &[usize],
+) -> Vec<Near> {
+    let [fewest, .., most] = *candidates else {
+        return Vec::new();
+    };
     let object_of = |photon: &Photon| photon.position_object[3].to_bits() & !CAUSTIC;
     let positions: Vec<[f32; 3]> = photons
         .iter()
@@ -230,7 +241,7 @@ fn nearest(visible_points: &[VisiblePoint], footprints: &[f32], photons: &[&Phot
     });
     // A photon at the very point says nothing of densities.
     let enough = |near: &Near| {
-        let least = near.distances2.get(CANDIDATES[0] - 1);
+        let least = near.distances2.get(fewest - 1);
         least.is_some_and(|&distance2| distance2 > 0.0)
     };
     probes.filter(enough).collect()
@@ -249,7 +260,7 @@ mod tests {
     const FOOTPRINT: f32 = 2e-3;
 
     /// On the unit square: visible points evenly, photons where `place` puts two random numbers.
-    fn choose(place: impl Fn(f32, f32) -> [f32; 2]) -> First {
+    fn choose(caustic: bool, place: impl Fn(f32, f32) -> [f32; 2]) -> First {
         let points: Vec<VisiblePoint> = (0..2000)
             .map(|i| {
                 let [x, y, ..] = random(1_000_000 + i);
@@ -265,17 +276,17 @@ mod tests {
                 let [u, v, ..] = random(i);
                 let [x, y] = place(u, v);
                 Photon {
-                    position_object: [x, y, 0.0, f32::from_bits(0)],
+                    position_object: [x, y, 0.0, f32::from_bits(if caustic { CAUSTIC } else { 0 })],
                     flux_direction: [0.0; 4],
                 }
             })
             .collect();
-        first(&points, &[FOOTPRINT; 2000], &photons, 1.0)[0]
+        first(&points, &[FOOTPRINT; 2000], &photons, 1.0)[usize::from(caustic)]
     }
 
     #[test]
     fn even_photons_get_a_large_radius_and_it_holds_as_many() {
-        let First { footprints, photons } = choose(|x, y| [x, y]);
+        let First { footprints, photons } = choose(false, |x, y| [x, y]);
         let radius2 = (footprints * FOOTPRINT).powi(2);
         assert!(photons >= 48, "{photons} photons");
         let held = 20_000.0 * std::f32::consts::PI * radius2;
@@ -287,8 +298,18 @@ mod tests {
 
     #[test]
     fn photons_in_fine_lines_get_a_small_one() {
-        let lines = choose(|x, y| [((10.0 * x).floor() + (10.0 * x).fract() * 0.1) / 10.0, y]);
+        let lines = choose(false, |x, y| {
+            [((10.0 * x).floor() + (10.0 * x).fract() * 0.1) / 10.0, y]
+        });
         assert!(lines.photons <= 16, "{lines:?}");
+    }
+
+    #[test]
+    fn caustics_get_small_ones_and_those_of_sharp_edges_the_smallest() {
+        let even = choose(true, |x, y| [x, y]);
+        let edges = choose(true, |x, y| [0.45 + 0.1 * x, 0.45 + 0.1 * y]);
+        assert_eq!(even.photons, 16, "{even:?}");
+        assert!(edges.photons < 8, "{edges:?}");
     }
 
     #[test]
