@@ -33,10 +33,12 @@ fn unprotected(commands: &[Command]) -> Vec<(usize, usize)> {
 
 fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording)> {
     let mut recordings = Vec::new();
-    for (index, method) in METHODS.iter().enumerate() {
-        if method.stages().is_none() {
-            continue;
-        }
+    let methods = METHODS
+        .iter()
+        .enumerate()
+        .filter(|(_, method)| method.stages().is_some());
+    // With one photon map, and with two.
+    for ((index, method), specular) in methods.flat_map(|method| [(method, false), (method, true)]) {
         let config = RenderConfig {
             resolution: [320, 280],
             gather: Some(index),
@@ -44,7 +46,7 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
             ..RenderConfig::default()
         };
         let limits = Limits {
-            specular: false,
+            specular,
             storage_buffer_bytes,
             loop_limit: u32::MAX,
             lanes: 4096,
@@ -59,7 +61,7 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
             sizes: &sizes,
             features: SceneFeatures::ALL,
         };
-        recordings.push((method.name.to_owned(), stages.iteration(1)));
+        recordings.push((format!("{}, specular: {specular}", method.name), stages.iteration(1)));
     }
     recordings
 }

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, demand_floor2, settings};
 use crate::config::{EmissionChoice, Estimator, Limits, RenderConfig, SEQUENCES, Sizes};
-use crate::emission::{Aim, PILOT_ROUNDS, is_learned_from, pilot_iteration};
+use crate::emission::{Aim, is_learned_from};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
 use crate::layout::{Coverage, DirectSum, Gathered, Settings, Statistics};
@@ -138,30 +138,20 @@ impl Renderer {
         let radii2 = radii(&self.settings, &seen, &mut of_pilot);
         let demand = self.demand(&seen, &radii2);
         if self.config.emission == EmissionChoice::Aimed {
-            self.aim = Some(Aim::new(&self.scene, &seen.points));
-            for round in 0..PILOT_ROUNDS {
-                let batch = Batch {
-                    iteration: pilot_iteration(round),
-                    first_path: 0,
-                    paths: self.sizes.pilot_paths(self.config.photons),
-                };
+            let paths = self.sizes.pilot_paths(self.config.photons);
+            self.aim = Aim::by_pilots(&self.config, &self.scene, &seen.points, |table, iteration| {
                 let inputs = Inputs {
                     demand: demand.as_ref(),
+                    emission: Some(table),
                     ..self.inputs()
                 };
-                let values = photons(&inputs, batch, &counts).values;
-                if let Some(aim) = &mut self.aim {
-                    aim.learn(&self.config, batch.iteration, 0, &values);
-                    if round + 1 < PILOT_ROUNDS {
-                        aim.update();
-                    }
-                }
-            }
-            let anyway = self.config.aims_anyway;
-            self.aim = self.aim.take().filter(|aim| anyway || aim.is_worth_it());
-            if let Some(aim) = &mut self.aim {
-                aim.update();
-            }
+                let batch = Batch {
+                    iteration,
+                    first_path: 0,
+                    paths,
+                };
+                Ok::<_, Error>(photons(&inputs, batch, &counts).values)
+            })?;
         }
         self.choose_radius(&seen, demand.as_ref())
     }
@@ -230,7 +220,7 @@ impl Backend for Renderer {
         let iteration = self.iterations;
         if self.aim.is_some() && self.config.begins_sequences(iteration) {
             if iteration > 0 {
-                self.settings.demand_floor2 = demand_floor2(&self.resolve_all()?);
+                self.settings.demand_floor2 = demand_floor2(&self.resolve()?);
             }
             // What an iteration learns changes no sequence.
             if let Some(aim) = &mut self.aim {

@@ -15,7 +15,7 @@ use crate::random::Random;
 use crate::scene::PackedScene;
 
 /// Rounds of learning before the first iteration, each of a quarter of its paths.
-pub const PILOT_ROUNDS: u32 = 4;
+const PILOT_ROUNDS: u32 = 4;
 /// Paths of one of the first iterations that are learned from at the most, and of a later one: where photons are wanted is found
 /// early, and seldom ones of much flux need many paths to be found.
 const COUNTED_PATHS: [u32; 2] = [1 << 16, 1 << 14];
@@ -49,7 +49,7 @@ const CUT_ROUNDS: usize = 8;
 const THINNEST: f32 = 1.0 / 65536.0;
 
 /// The iteration whose random numbers a pilot round draws. No render gets that far, and the radius has its own.
-pub fn pilot_iteration(round: u32) -> u32 {
+fn pilot_iteration(round: u32) -> u32 {
     radius::PILOT - 1 - round
 }
 
@@ -187,6 +187,30 @@ impl Aim {
         let targets = targets(scene, points);
         let spheres = targets.spheres.iter().map(|target| target.sphere.packed());
         Self::of_strata(strata(scene, &targets), spheres.collect(), targets.view)
+    }
+
+    /// Aims paths by pilot rounds; `trace` follows an iteration's paths that start by a table, and returns what those were worth.
+    /// `None` where aiming isn't worth its cost.
+    ///
+    /// # Errors
+    /// Those of `trace`.
+    pub fn by_pilots<E>(
+        config: &RenderConfig,
+        scene: &PackedScene,
+        points: &[VisiblePoint],
+        mut trace: impl FnMut(&Table, u32) -> Result<Vec<u32>, E>,
+    ) -> Result<Option<Self>, E> {
+        let mut aim = Self::new(scene, points);
+        for round in 0..PILOT_ROUNDS {
+            // Does nothing before anything is known.
+            aim.update();
+            let iteration = pilot_iteration(round);
+            let values = trace(aim.table(), iteration)?;
+            aim.learn(config, iteration, 0, &values);
+        }
+        let is_kept = config.aims_anyway || aim.is_worth_it();
+        aim.update();
+        Ok(is_kept.then_some(aim))
     }
 
     fn of_strata(strata: Vec<Stratum>, spheres: Vec<[f32; 4]>, view: Option<u32>) -> Self {

@@ -12,6 +12,6 @@ mod strata;
 mod table;
 mod targets;
 
-pub use learning::{Aim, PILOT_ROUNDS, counted_paths, is_learned_from, pilot_iteration};
+pub use learning::{Aim, counted_paths, is_learned_from};
 pub use path_value::PathValue;
 pub use table::{DIMENSIONS, Table, light_of};

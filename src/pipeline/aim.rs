@@ -4,8 +4,9 @@ use super::Renderer;
 use super::stages::reporting;
 use crate::backend::demand_floor2;
 use crate::config::EmissionChoice;
-use crate::emission::{Aim, PILOT_ROUNDS, counted_paths, pilot_iteration};
+use crate::emission::{Aim, Table, counted_paths};
 use crate::error::Result;
+use crate::film::Image;
 use crate::layout::VisiblePoint;
 use crate::scene::PackedScene;
 use crate::stage::BufferId;
@@ -22,28 +23,23 @@ impl Renderer {
             return Ok(());
         }
         let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
-        self.aim = Some(Aim::new(scene, &visible_points));
-        self.upload_table()?;
-        for round in 0..PILOT_ROUNDS {
-            let iteration = pilot_iteration(round);
+        let config = self.config.clone();
+        let paths = self.sizes.pilot_paths(config.photons);
+        let aim = Aim::by_pilots(&config, scene, &visible_points, |table, iteration| {
+            self.upload_table(table)?;
             self.run_until_it_fits(|stages| {
                 let mut recording = reporting();
-                let paths = stages.sizes.pilot_paths(stages.config.photons);
                 stages.trace_paths(iteration, 0..paths, &mut recording);
                 recording
             })?;
-            self.learn(iteration, self.sizes.pilot_paths(self.config.photons))?;
-            if round + 1 < PILOT_ROUNDS {
-                self.update_aim()?;
-            }
+            self.path_values(iteration, paths)
+        })?;
+        self.sizes.aimed = aim.is_some();
+        if let Some(aim) = &aim {
+            self.upload_table(aim.table())?;
         }
-        if self.config.aims_anyway || self.aim.as_ref().is_some_and(Aim::is_worth_it) {
-            self.update_aim()
-        } else {
-            self.aim = None;
-            self.sizes.aimed = false;
-            Ok(())
-        }
+        self.aim = aim;
+        Ok(())
     }
 
     /// Where sequences begin anew paths may be aimed anew: what an iteration learns changes no sequence.
@@ -52,32 +48,38 @@ impl Renderer {
             return Ok(());
         }
         if iteration > 0 {
-            let (_, resolved) = self.picture()?;
-            self.settings.demand_floor2 = demand_floor2(&resolved);
+            let recording = self.stages().picture(self.iterations, self.emitted);
+            self.run(&recording)?;
+            let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
+            self.settings.demand_floor2 = demand_floor2(&Image::from_film(self.config.resolution, &film));
             self.upload_settings()?;
         }
-        self.update_aim()
+        let Some(mut aim) = self.aim.take() else { return Ok(()) };
+        aim.update();
+        self.upload_table(aim.table())?;
+        self.aim = Some(aim);
+        Ok(())
     }
 
     /// Learns from the first of an iteration's paths, of which the first batch has had so many.
     pub(super) fn learn(&mut self, iteration: u32, paths: u32) -> Result<()> {
-        if let Some(aim) = &mut self.aim {
-            let count = paths.min(counted_paths(iteration)) as usize;
-            let values: Vec<u32> = self.device.download(BufferId::PathValues, Some(count))?;
-            aim.learn(&self.config, iteration, 0, &values);
+        if self.aim.is_some() {
+            let values = self.path_values(iteration, paths)?;
+            if let Some(aim) = &mut self.aim {
+                aim.learn(&self.config, iteration, 0, &values);
+            }
         }
         Ok(())
     }
 
-    fn update_aim(&mut self) -> Result<()> {
-        let Some(aim) = &mut self.aim else { return Ok(()) };
-        aim.update();
-        self.upload_table()
+    /// What the first of an iteration's paths were worth, of which the first batch has had so many.
+    fn path_values(&mut self, iteration: u32, paths: u32) -> Result<Vec<u32>> {
+        let count = paths.min(counted_paths(iteration)) as usize;
+        self.device.download(BufferId::PathValues, Some(count))
     }
 
-    fn upload_table(&mut self) -> Result<()> {
-        let Some(aim) = &self.aim else { return Ok(()) };
-        let mut texels = aim.table().texels();
+    fn upload_table(&mut self, table: &Table) -> Result<()> {
+        let mut texels = table.texels();
         // As large as it may become.
         let bytes = self.sizes.bytes(BufferId::EmissionTable).unwrap_or_default();
         assert!(
