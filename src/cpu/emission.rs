@@ -11,10 +11,11 @@ use super::light::{Choice, choose_light, emits, emitted_radiance, spot_falloff};
 use super::sampling::{basis, cosine_direction, disc_point, triangle_point};
 use super::surface::{offset_origin, surface_at};
 use super::texture::{apply_textures, share_there};
-use super::vector::{rgb, xyz};
+use super::vector::rgb;
 use crate::emission::{Table, light_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
 use crate::random::Random;
+use crate::scene::Sphere;
 
 #[cfg(test)]
 mod tests;
@@ -27,41 +28,6 @@ pub(super) struct Emission {
     pub ignored: Option<PlacedTriangle>,
     /// Of a punctual light; 0 for one that reaches any distance.
     pub inverse_range: f64,
-}
-
-/// What paths are to pass through.
-#[derive(Debug, Clone, Copy)]
-struct Sphere {
-    centre: DVec3,
-    radius: f64,
-}
-
-impl Sphere {
-    fn of(sphere: [f32; 4]) -> Self {
-        Self {
-            centre: xyz(sphere),
-            radius: sphere[3].into(),
-        }
-    }
-
-    /// Whether a ray meets it. One that comes from afar has no beginning.
-    fn is_met(&self, ray: Ray, from_afar: bool) -> bool {
-        let to_centre = self.centre - ray.origin;
-        let along = to_centre.dot(ray.direction);
-        let along = if from_afar { along } else { along.max(0.0) };
-        (to_centre - along * ray.direction).length_squared() <= self.radius * self.radius
-    }
-
-    /// Axis of the cone in which it is seen, and 1 − cos of the angle between that and the cone's sides; 2 from inside.
-    fn cone(&self, from: DVec3) -> (DVec3, f64) {
-        let way = self.centre - from;
-        let sin2 = self.radius * self.radius / way.length_squared();
-        if sin2 < 1.0 {
-            (way.normalize(), sin2 / (1.0 + (1.0 - sin2).sqrt()))
-        } else {
-            (DVec3::Z, 2.0)
-        }
-    }
 }
 
 /// A start, and what is to be known of it to tell which targets it meets.
@@ -138,8 +104,8 @@ fn emit_aimed(inputs: &Inputs<'_>, table: &Table, u: [f64; 4], w: [f64; 4]) -> E
     let (place, direction) = (DVec2::new(x, y), DVec2::new(direction_x, direction_y));
     let start = from_light(inputs, light, place, direction, w[1], target);
     let is_met = |sphere: &Sphere| match start.passed {
-        Some(origin) => sphere.is_met(Ray { origin, ..start.ray }, true),
-        None => sphere.is_met(start.ray, false),
+        Some(origin) => sphere.is_met(origin, start.ray.direction, true),
+        None => sphere.is_met(start.ray.origin, start.ray.direction, false),
     };
     let met = start.on_target || target.is_none_or(|target| is_met(&target));
     let kept = met

@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use super::targets::{Sphere, Targets, corners_of};
+use super::targets::{Targets, corners_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
-use crate::scene::PackedScene;
+use crate::scene::{PackedScene, Sphere};
 
 /// Of a stratum's share of the power, what its probability is at least: no photon carries much more than by power.
 const FLOOR: f64 = 0.2;
@@ -122,22 +122,12 @@ fn share(scene: &PackedScene, source: &Range<u32>, sphere: &Sphere) -> f64 {
     let count = probes.len() as f64;
     let shares = probes.map(|light| match light.kind {
         DIRECTIONAL_LIGHT | ENVIRONMENT_LIGHT => PI * sphere.radius.powi(2) / f64::from(light.area),
-        POINT_LIGHT => versine(sphere, points_of(scene, light)[0]) / 2.0,
+        POINT_LIGHT => sphere.versine(points_of(scene, light)[0]) / 2.0,
         SPOT_LIGHT => {
             let (inner, outer) = (f64::from(light.inner), f64::from(light.outer));
-            versine(sphere, points_of(scene, light)[0]) / (inner + (outer - inner) / 3.0)
+            sphere.versine(points_of(scene, light)[0]) / (inner + (outer - inner) / 3.0)
         }
-        _ => 2.0 * versine(sphere, points_of(scene, light).into_iter().sum::<DVec3>() / 3.0),
+        _ => 2.0 * sphere.versine(points_of(scene, light).into_iter().sum::<DVec3>() / 3.0),
     });
     shares.map(|share| share.min(1.0)).sum::<f64>() / count
-}
-
-/// 1 − cos of the angle between the axis and the sides of the cone in which a sphere is seen.
-fn versine(sphere: &Sphere, from: DVec3) -> f64 {
-    let sin2 = sphere.radius.powi(2) / sphere.centre.distance_squared(from);
-    if sin2 < 1.0 {
-        sin2 / (1.0 + (1.0 - sin2).sqrt())
-    } else {
-        2.0
-    }
 }

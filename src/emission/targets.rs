@@ -8,7 +8,7 @@ use crate::config::MOST_TARGETS;
 use crate::layout::{
     FOLLOWED_ALPHA, Light, Material, NO_OBJECT, POINT_LIGHT, SPOT_LIGHT, ShadingTriangle, VisiblePoint,
 };
-use crate::scene::{DIELECTRIC, GLOSSY, MIRROR, PackedScene, Placement};
+use crate::scene::{DIELECTRIC, GLOSSY, MIRROR, PackedScene, Placement, Sphere};
 
 /// Spheres around specular objects at the most.
 const MOST_SPECULAR: usize = 12;
@@ -18,61 +18,6 @@ const MOST_NESTED: i32 = 14;
 const MOST_COMPARED: usize = 256;
 /// Part of the scene's radius beyond which aiming at an object is of no use.
 const LARGE: f64 = 0.5;
-/// What spheres are larger than what they hold.
-const MARGIN: f64 = 1.0 + 1e-4;
-
-/// A sphere in render space.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sphere {
-    pub centre: DVec3,
-    pub radius: f64,
-}
-
-impl Sphere {
-    /// Around points, about the middle of their bounds; `None` where there are none.
-    pub fn around(points: impl Iterator<Item = DVec3> + Clone) -> Option<Self> {
-        let mut bounds: Option<(DVec3, DVec3)> = None;
-        for point in points.clone() {
-            let (low, high) = bounds.unwrap_or((point, point));
-            bounds = Some((low.min(point), high.max(point)));
-        }
-        let (low, high) = bounds?;
-        let centre = 0.5 * (low + high);
-        let radius2 = points.map(|point| (point - centre).length_squared());
-        Some(Self {
-            centre,
-            radius: radius2.fold(0.0, f64::max).sqrt(),
-        })
-    }
-
-    /// The smallest one around two.
-    fn joint(&self, other: &Self) -> Self {
-        let way = other.centre - self.centre;
-        let distance = way.length();
-        if distance + other.radius <= self.radius {
-            return *self;
-        }
-        if distance + self.radius <= other.radius {
-            return *other;
-        }
-        let radius = 0.5 * (distance + self.radius + other.radius);
-        Self {
-            centre: self.centre + way * ((radius - self.radius) / distance),
-            radius,
-        }
-    }
-
-    /// Whether all of another one lies in it.
-    pub fn contains(&self, other: &Self) -> bool {
-        self.centre.distance(other.centre) + MARGIN * other.radius <= self.radius
-    }
-
-    /// As the device has it.
-    pub fn packed(&self) -> [f32; 4] {
-        let centre = self.centre.as_vec3();
-        [centre.x, centre.y, centre.z, self.radius as f32]
-    }
-}
 
 /// A sphere that paths are aimed at.
 #[derive(Debug, Clone, Copy)]
@@ -104,7 +49,7 @@ pub(super) fn targets(scene: &PackedScene, points: &[VisiblePoint]) -> Targets {
     let radius2 = own.chain(placed).map(DVec3::length_squared).fold(0.0, f64::max);
     let whole = Sphere {
         centre: DVec3::ZERO,
-        radius: radius2.sqrt() * MARGIN,
+        radius: radius2.sqrt() * Sphere::MARGIN,
     };
     let is_small = |sphere: &Sphere| sphere.radius < LARGE * whole.radius;
     let specular = clustered(specular_objects(scene)).into_iter().filter(is_small);
@@ -205,7 +150,7 @@ fn clustered(mut spheres: Vec<Sphere>) -> Vec<Sphere> {
     }
     // Paths that graze the sphere meet what it holds.
     for sphere in &mut spheres {
-        sphere.radius *= MARGIN;
+        sphere.radius *= Sphere::MARGIN;
     }
     spheres
 }
@@ -265,7 +210,10 @@ mod tests {
         let found = clustered(balls);
         assert_eq!(found.len(), MOST_SPECULAR);
         let own = found.iter().find(|sphere| sphere.centre == small.centre);
-        assert!(own.is_some_and(|own| own.radius <= MARGIN * small.radius), "{found:?}");
+        assert!(
+            own.is_some_and(|own| own.radius <= Sphere::MARGIN * small.radius),
+            "{found:?}"
+        );
     }
 
     #[test]

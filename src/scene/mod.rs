@@ -39,6 +39,7 @@ mod primitive;
 mod punctual;
 mod sharing;
 mod skin;
+mod sphere;
 mod tangents;
 mod texture;
 
@@ -50,6 +51,7 @@ pub(crate) use light_table::set_alias_table;
 pub use load::LoadOptions;
 pub use packed::PackedScene;
 pub use placement::Placement;
+pub(crate) use sphere::Sphere;
 pub use texture::Textures;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};

@@ -3,9 +3,10 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::environment::Environment;
+use super::sphere::Sphere;
 use crate::layout::{ENVIRONMENT_LIGHT, Light, TRIANGLE_LIGHT};
 
 /// Radii of a light within which it is near: outside of it no point of it is more than three times as far as another one.
@@ -31,7 +32,7 @@ impl NearLights<'_> {
         let sphere = |source: &Range<u32>| {
             let lights = &self.lights[source.start as usize..source.end as usize];
             match lights[0].kind {
-                TRIANGLE_LIGHT => Some(self.around(lights)),
+                TRIANGLE_LIGHT => self.around(lights),
                 ENVIRONMENT_LIGHT => Some([0.0, 0.0, 0.0, f32::INFINITY]),
                 _ => None,
             }
@@ -39,16 +40,11 @@ impl NearLights<'_> {
         self.sources.iter().filter_map(sphere).collect()
     }
 
-    fn around(&self, lights: &[Light]) -> [f32; 4] {
-        let corners = || {
-            let of_light = |light: &Light| self.corners[light.triangle as usize].map(Vec3::as_dvec3);
-            lights.iter().flat_map(of_light)
-        };
-        let least = corners().fold(DVec3::INFINITY, DVec3::min);
-        let most = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
-        let centre = 0.5 * (least + most);
-        let radius2 = corners().fold(0.0, |radius2: f64, corner| radius2.max(corner.distance_squared(centre)));
-        centre.as_vec3().extend((REACH.powi(2) * radius2) as f32).to_array()
+    fn around(&self, lights: &[Light]) -> Option<[f32; 4]> {
+        let of_light = |light: &Light| self.corners[light.triangle as usize].map(Vec3::as_dvec3);
+        let sphere = Sphere::around(lights.iter().flat_map(of_light))?;
+        let radius2 = (REACH * sphere.radius).powi(2);
+        Some(sphere.centre.as_vec3().extend(radius2 as f32).to_array())
     }
 
     /// Probability that a direction of the BSDF is taken near a light: about the chance that it meets one. That is the part of

@@ -8,6 +8,7 @@ use crate::config::{RenderConfig, Sampler};
 use crate::emission::{Aim, PathValue};
 use crate::film::Image;
 use crate::layout::{Settings, VisiblePoint};
+use crate::random::PathKind;
 use crate::scene::{self, PackedScene, PunctualLight, Scene};
 
 /// The part of a spot's photons within an angle is the part of its intensity's integral there.
@@ -134,7 +135,7 @@ fn fluxes(scene: &PackedScene, emission: Option<&Table>, region: Sphere, kinds: 
         let start = emit(&inputs, &mut Random::of_photon(&config, path, iteration));
         let flux = start.flux.element_sum();
         assert!(flux.is_finite() && flux >= 0.0);
-        if flux > 0.0 && region.is_met(start.ray, false) {
+        if flux > 0.0 && region.is_met(start.ray.origin, start.ray.direction, false) {
             let [sum, squares, count] = &mut sums[light_of_start(scene, &start)];
             *sum += flux;
             *squares += flux * flux;
@@ -164,7 +165,8 @@ fn mislead(aim: &mut Aim, scene: &PackedScene, region: Sphere) {
         };
         let value = |path| {
             let start = emit(&inputs, &mut Random::of_photon(&config, path, iteration));
-            let useless = start.flux.max_element() <= 0.0 || region.is_met(start.ray, false);
+            let useless =
+                start.flux.max_element() <= 0.0 || region.is_met(start.ray.origin, start.ray.direction, false);
             let value = if useless { 0.0 } else { 1.0 };
             PathValue { value, rays: 1 }.packed()
         };
@@ -216,5 +218,51 @@ fn aimed_paths_bring_each_lights_flux_whatever_the_table() {
             }
         }
         assert!(compared.iter().all(|&compared| compared), "{compared:?}");
+    }
+}
+
+/// The mean over all directions of what photons carry is that of cosine-weighted ones, whatever part of them is sent to the view.
+#[test]
+fn guided_photons_carry_as_much_as_those_that_are_not() {
+    const COUNT: u32 = 200_000;
+    let scene = lit_room(false);
+    let config = RenderConfig::default();
+    let normal = DVec3::Y;
+    for (distance, side) in [(3.0, 0.2), (3.0, 2.0), (2.0, 2.9)] {
+        let table = Table {
+            spheres: vec![[side, distance, 0.0, 0.5]],
+            view: Some(0),
+            cells: Vec::new(),
+        };
+        let inputs = Inputs {
+            demand: None,
+            scene: &scene,
+            settings: &Settings::zeroed(),
+            config: &config,
+            emission: Some(&table),
+        };
+        let (mut sum, mut squares, mut slope, mut largest) = (0.0, 0.0, 0.0, 0.0f64);
+        for path in 0..COUNT {
+            let mut random = Random::with(Sampler::Independent, PathKind::Photon, path, 0, 1);
+            let (u, v) = (random.next4(), random.next4());
+            let cosine = cosine_direction(normal, v[0], v[1]);
+            let (direction, weight) = guide(&inputs, DVec3::ZERO, normal, u, cosine);
+            sum += weight;
+            squares += weight * weight;
+            slope += weight * direction.dot(normal);
+            largest = largest.max(weight);
+        }
+        let count = f64::from(COUNT);
+        let mean = sum / count;
+        let error = ((squares / count - mean * mean) / count).sqrt();
+        assert!(error > 1e-4, "nothing was guided: weights are all {mean}");
+        assert!((mean - 1.0).abs() < 5.0 * error, "mean weight {mean} ± {error}");
+        // ∫ cos²θ / π over the hemisphere; each weight is 2 at the most.
+        assert!(
+            (slope / count - 2.0 / 3.0).abs() < 5.0 * error,
+            "mean cosine {}",
+            slope / count
+        );
+        assert!(largest <= 2.0 + 1e-9, "weight {largest}");
     }
 }

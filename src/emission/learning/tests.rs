@@ -110,3 +110,45 @@ fn a_table_never_has_more_cells_than_room() {
     assert_sound(&aim);
     assert!(aim.cells.len() <= MOST_EMISSION_CELLS as usize, "{}", aim.cells.len());
 }
+
+#[test]
+fn where_paths_take_many_rays_some_are_not_traced_and_the_others_carry_their_flux() {
+    let config = RenderConfig::default();
+    let mut aim = two_strata();
+    // Those by power take one ray of twelve, nearly.
+    let rays = |path: u32| {
+        let mut random = Random::of_photon(&config, path, 0);
+        let (u, w) = (random.next4(), random.next4());
+        if aim.cells[aim.table().choose(u, w).cell].stratum == 0 {
+            12
+        } else {
+            1
+        }
+    };
+    let values: Vec<u32> = (0..counted_paths(0))
+        .map(|path| {
+            PathValue {
+                value: if rays(path) > 1 { 1.0 } else { 0.1 },
+                rays: rays(path),
+            }
+            .packed()
+        })
+        .collect();
+    aim.learn(&config, 0, 0, &values);
+    aim.update();
+    let untraced = aim.table().cells[aim.cells.len()];
+    assert_eq!(untraced.weight, 0.0, "{untraced:?}");
+    let traced = aim.traced();
+    assert!((0.3..0.9).contains(&traced), "{traced} of the paths are traced");
+    for (cell, packed) in aim.cells.iter().zip(&aim.table().cells) {
+        // The flux of all is that of each cell's volume.
+        let flux = f64::from(packed.weight) * traced * cell.probability;
+        assert!((flux / cell.volume() - 1.0).abs() < 1e-6, "{flux}: {cell:?}");
+    }
+    let mean_rays: f64 = aim
+        .cells
+        .iter()
+        .map(|cell| traced * cell.probability * cell.counts.rays / cell.counts.paths)
+        .sum();
+    assert!((mean_rays / FEWEST_RAYS - 1.0).abs() < 1e-6, "{mean_rays} rays a path");
+}
