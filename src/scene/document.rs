@@ -9,11 +9,11 @@ use std::path::Path;
 
 use gltf::json::Root;
 use gltf::json::buffer::View;
-use serde::Deserialize;
+use serde_json::Value;
 
 use super::buffer::{self, slice};
 use super::diagnostic::{Check, damaged, quote};
-use super::{coat, glb, meshopt};
+use super::{coat, glb, json, meshopt};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
@@ -49,22 +49,6 @@ pub(super) struct Document {
 
 /// Allows attributes to be stored as small integers.
 const QUANTIZATION: &str = "KHR_mesh_quantization";
-
-/// What must be known before the rest is parsed: another version or extension may have another structure.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Preamble {
-    asset: Option<Asset>,
-    #[serde(default)]
-    extensions_required: Vec<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Asset {
-    version: String,
-    min_version: Option<String>,
-}
 
 impl Document {
     /// Reads the file at `path` and all buffers that it refers to.
@@ -136,41 +120,40 @@ fn read_file(path: &Path) -> Check<Vec<u8>> {
 }
 
 fn parse(json: &[u8]) -> Check<Root> {
-    // The specification forbids a byte order mark; some editors add one all the same.
-    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-    let preamble: Preamble = serde_json::from_slice(json).map_err(json_error)?;
-    check_version(preamble.asset.as_ref())?;
-    for extension in &preamble.extensions_required {
-        if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) {
+    let json = json::read(json)?;
+    // Before the rest: another version or extension may have another structure.
+    check_version(&json)?;
+    let required = json.get("extensionsRequired").and_then(Value::as_array);
+    for extension in required.into_iter().flatten().filter_map(Value::as_str) {
+        if !SUPPORTED_EXTENSIONS.contains(&extension) {
             return Err(format!(
                 "requires the extension {}, which isn't supported; export the scene without it",
                 quote(extension)
             ));
         }
     }
-    serde_json::from_slice(json).map_err(json_error)
+    json::to_root(json)
 }
 
-fn json_error(error: serde_json::Error) -> String {
-    if error.is_data() {
-        damaged(format_args!("isn't glTF 2.0 ({error})"))
-    } else {
-        format!("isn't glTF: neither .glb nor JSON ({error}); give a .gltf or .glb file, or export it again")
-    }
-}
-
-fn check_version(asset: Option<&Asset>) -> Check<()> {
-    let Some(asset) = asset else {
+fn check_version(json: &Value) -> Check<()> {
+    let Some(asset) = json.get("asset").filter(|asset| asset.get("version").is_some()) else {
         return Err(damaged("has no asset.version, so it isn't glTF 2.0"));
     };
-    let is_2 = asset.version == "2" || asset.version.starts_with("2.");
-    let is_readable = asset.min_version.as_deref().is_none_or(|version| version == "2.0");
-    if is_2 && is_readable {
+    let text = |name: &str| match asset.get(name) {
+        None => Ok(None),
+        Some(Value::String(version)) => Ok(Some(version.as_str())),
+        Some(other) => Err(damaged(format_args!(
+            "isn't glTF 2.0: its asset.{name} is {}, not a text such as \"2.0\"",
+            quote(&other.to_string())
+        ))),
+    };
+    let (version, least) = (text("version")?.unwrap_or_default(), text("minVersion")?);
+    let is_2 = version == "2" || version.starts_with("2.");
+    if is_2 && least.is_none_or(|least| least == "2.0") {
         return Ok(());
     }
-    let version = asset.min_version.as_ref().unwrap_or(&asset.version);
     Err(format!(
         "is glTF {}, but only 2.0 is supported; export it as glTF 2.0",
-        quote(version)
+        quote(least.unwrap_or(version))
     ))
 }

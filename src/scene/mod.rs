@@ -24,6 +24,7 @@ mod glb;
 mod graph;
 mod image;
 mod instance;
+mod json;
 mod light;
 mod light_sources;
 mod light_table;

@@ -49,8 +49,16 @@ fn counts_and_offsets_that_overflow_are_refused_without_allocating() {
         assert_change_fails("/bufferViews/0/byteLength", huge.clone(), &["accessor 0"]);
         assert_change_fails("/bufferViews/0/byteStride", huge, &["accessor 0"]);
     }
-    assert_change_fails("/accessors/0/count", json!(-1), &["isn't glTF 2.0", "line"]);
-    assert_change_fails("/accessors/0/count", json!(1.5), &["isn't glTF 2.0", "line"]);
+    assert_change_fails(
+        "/accessors/0/count",
+        json!(-1),
+        &["isn't glTF 2.0", "accessors[0].count"],
+    );
+    assert_change_fails(
+        "/accessors/0/count",
+        json!(1.5),
+        &["isn't glTF 2.0", "accessors[0].count"],
+    );
 }
 
 #[test]

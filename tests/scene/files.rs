@@ -224,3 +224,52 @@ fn the_shared_scenes_load() {
         );
     }
 }
+
+/// JSON schema's integers include 5126.0, null members are those of careless exporters, and `extras` may be of any type.
+#[test]
+fn what_the_schema_allows_to_be_written_in_several_ways_loads_alike() {
+    let plain = Fixture::room().scene();
+    for extras in [
+        json!("text"),
+        json!(7),
+        json!(true),
+        json!([1, "a"]),
+        json!({"a": null}),
+        json!(null),
+    ] {
+        let mut room = Fixture::room();
+        for place in [
+            "/extras",
+            "/asset/extras",
+            "/nodes/0/extras",
+            "/meshes/0/primitives/0/extras",
+        ] {
+            room.set(place, extras.clone());
+        }
+        assert_eq!(room.scene().positions, plain.positions, "extras {extras}");
+    }
+    let mut room = Fixture::room();
+    room.set("/accessors/0/componentType", json!(5126.0));
+    room.set("/accessors/0/bufferView", json!(0.0));
+    room.set(
+        "/buffers/0/byteLength",
+        json!(room.json["buffers"][0]["byteLength"].as_f64()),
+    );
+    room.set("/nodes/0/skin", json!(null));
+    room.set("/animations", json!(null));
+    room.set("/nodes/0/somethingUnknown", json!({"a": [1.0, null]}));
+    let scenes = json!([{"name": "empty"}, room.json["scenes"][0]]);
+    room.set("/scenes", scenes);
+    room.set("/scene", json!(1.0));
+    assert_eq!(room.scene().positions, plain.positions);
+}
+
+#[test]
+fn a_version_that_is_a_number_and_a_value_of_a_wrong_type_are_named_with_their_place() {
+    let mut room = Fixture::room();
+    room.set("/asset/version", json!(2.0));
+    room.assert_fails(&["asset.version", "not a text"]);
+    let mut room = Fixture::room();
+    room.set("/nodes/0/mesh", json!("floor"));
+    room.assert_fails(&["isn't glTF 2.0", "nodes[0].mesh"]);
+}
