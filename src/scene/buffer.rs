@@ -56,7 +56,7 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8
             binary.ok_or_else(|| damaged("it has no uri, and the file no binary chunk for it"))?,
             "the binary chunk".to_owned(),
         ),
-        Some(uri) => match uri.strip_prefix("data:") {
+        Some(uri) => match data_of(uri) {
             Some(data) => (decode_data_uri(data)?, "its data URI".to_owned()),
             None => {
                 let path = folder.join(relative_path(uri)?);
@@ -77,7 +77,7 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8
 
 /// The bytes that the uri of an image stands for.
 pub(super) fn read_uri(uri: &str, folder: &Path) -> Check<Vec<u8>> {
-    match uri.strip_prefix("data:") {
+    match data_of(uri) {
         Some(data) => decode_data_uri(data),
         None => read_file(&folder.join(relative_path(uri)?), MAX_TOTAL_SIZE),
     }
@@ -105,16 +105,28 @@ fn read_file(path: &Path, length: u64) -> Check<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Decodes `[media type];base64,…`, what follows `data:`. Media types are not told apart.
+/// What follows `data:`, in capitals or not.
+fn data_of(uri: &str) -> Option<&str> {
+    let (scheme, data) = uri.split_at_checked("data:".len())?;
+    scheme.eq_ignore_ascii_case("data:").then_some(data)
+}
+
+/// Decodes `[media type][;base64],…`, what follows `data:`: RFC 2397. Media types are not told apart. Line ends in base64 are
+/// skipped, as browsers do.
 fn decode_data_uri(data: &str) -> Check<Vec<u8>> {
     let (head, body) = data
         .split_once(',')
         .ok_or_else(|| damaged("its data URI has no comma before the data"))?;
-    if !head.ends_with(";base64") {
-        return Err("its data URI isn't base64; export it with base64 or external buffers".into());
+    let mut bytes = percent_decode(body);
+    let is_base64 = head
+        .rsplit_once(';')
+        .is_some_and(|(_, coding)| coding.trim().eq_ignore_ascii_case("base64"));
+    if !is_base64 {
+        return Ok(bytes);
     }
+    bytes.retain(|byte| !byte.is_ascii_whitespace());
     BASE64
-        .decode(body)
+        .decode(bytes)
         .map_err(|error| damaged(format_args!("its data URI isn't valid base64 ({error})")))
 }
 
@@ -131,7 +143,8 @@ fn relative_path(uri: &str) -> Check<PathBuf> {
             quote(scheme)
         ));
     }
-    let decoded = percent_decode(uri)
+    let decoded = String::from_utf8(percent_decode(uri))
+        .ok()
         .filter(|decoded| !decoded.contains('\0'))
         .ok_or_else(|| damaged(format_args!("its uri {} isn't a valid file name", quote(uri))))?;
     let path = PathBuf::from(decoded);
@@ -147,8 +160,8 @@ fn relative_path(uri: &str) -> Check<PathBuf> {
     Ok(path)
 }
 
-/// Replaces `%2F` and the like; a `%` without two digits stands for itself. `None` if the result isn't UTF-8.
-fn percent_decode(uri: &str) -> Option<String> {
+/// Replaces `%2F` and the like; a `%` without two digits stands for itself.
+fn percent_decode(uri: &str) -> Vec<u8> {
     let mut decoded = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let [first, tail @ ..] = rest {
@@ -163,7 +176,7 @@ fn percent_decode(uri: &str) -> Option<String> {
             }
         }
     }
-    String::from_utf8(decoded).ok()
+    decoded
 }
 
 /// Value of a hexadecimal digit.

@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use ppm_vk::scene::Scene;
 use serde_json::json;
 
@@ -68,7 +70,7 @@ fn buffer_uris_that_lead_elsewhere_are_refused() {
 fn bad_data_uris_are_named() {
     let uris = [
         ("data:application/octet-stream;base64", "no comma"),
-        ("data:application/octet-stream,abc", "isn't base64"),
+        ("data:application/octet-stream,a%62c", "has 3 bytes"),
         ("data:;base64,@@@@", "isn't valid base64"),
         ("data:;base64,AAAA", "has 3 bytes"),
     ];
@@ -76,6 +78,31 @@ fn bad_data_uris_are_named() {
         let mut room = Fixture::room();
         room.set("/buffers/0/uri", json!(uri));
         room.assert_fails(&["buffer 0", part]);
+    }
+}
+
+#[test]
+fn data_uris_may_be_in_capitals_percent_encoded_or_on_several_lines() {
+    let plain = Fixture::room().scene();
+    let room = Fixture::room();
+    let base64 = STANDARD.encode(&room.binary);
+    let lines = base64
+        .as_bytes()
+        .chunks(76)
+        .map(String::from_utf8_lossy)
+        .collect::<Vec<_>>();
+    let encoded = base64.replace('+', "%2B").replace('/', "%2f").replace('=', "%3D");
+    let percents: String = room.binary.iter().map(|byte| format!("%{byte:02x}")).collect();
+    for uri in [
+        format!("data:application/octet-stream;base64,{base64}"),
+        format!("DATA:;charset=utf-8;BASE64,{base64}"),
+        format!("data:;base64,{encoded}"),
+        format!("data:;base64,{}", lines.join("\r\n")),
+        format!("data:,{percents}"),
+    ] {
+        let mut room = Fixture::room();
+        room.set("/buffers/0/uri", json!(uri));
+        assert_eq!(room.scene().positions, plain.positions, "{uri}");
     }
 }
 
