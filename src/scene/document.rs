@@ -12,7 +12,7 @@ use gltf::json::buffer::View;
 use serde_json::Value;
 
 use super::buffer::{self, slice};
-use super::diagnostic::{Check, damaged, quote};
+use super::diagnostic::{Check, Warnings, damaged, quote};
 use super::{coat, glb, json, meshopt};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
@@ -52,14 +52,14 @@ const QUANTIZATION: &str = "KHR_mesh_quantization";
 
 impl Document {
     /// Reads the file at `path` and all buffers that it refers to.
-    pub(super) fn read(path: &Path) -> Check<Self> {
+    pub(super) fn read(path: &Path, warnings: &mut Warnings) -> Check<Self> {
         let mut bytes = read_file(path)?;
         let (json, binary) = if bytes.starts_with(glb::MAGIC) {
             glb::split(&bytes)?
         } else {
             (0..bytes.len(), None)
         };
-        let root = parse(&bytes[json])?;
+        let root = parse(&bytes[json], warnings)?;
         // The binary chunk can be most of the file: shrink to it instead of copying.
         let binary = binary.map(|chunk| {
             bytes.truncate(chunk.end);
@@ -119,8 +119,8 @@ fn read_file(path: &Path) -> Check<Vec<u8>> {
     Ok(bytes)
 }
 
-fn parse(json: &[u8]) -> Check<Root> {
-    let json = json::read(json)?;
+fn parse(json: &[u8], warnings: &mut Warnings) -> Check<Root> {
+    let json = json::read(json, warnings)?;
     // Before the rest: another version or extension may have another structure.
     check_version(&json)?;
     let required = json.get("extensionsRequired").and_then(Value::as_array);

@@ -1,22 +1,34 @@
 //! The JSON of a glTF file, in the form that the `gltf` crate's types expect. They are stricter than the schema.
 
+use std::collections::BTreeSet;
+
 use gltf::json::Root;
 use serde_json::{Number, Value};
 
-use super::diagnostic::{Check, damaged, quote};
+use super::diagnostic::{Check, Warnings, damaged, quote};
+
+/// Component types of accessors.
+const U8: u64 = 5121;
+const U16: u64 = 5123;
 
 /// Integers from here on aren't exact as floating-point numbers.
 const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// Reads JSON, and writes alike what the schema allows to be written in several ways: members that are null are as good as
-/// absent, `extras` may be anything and are read by nobody, and integers may have a fraction of zero.
-pub(super) fn read(json: &[u8]) -> Check<Value> {
+/// absent, `extras` may be anything and are read by nobody, and integers may have a fraction of zero. Warns of what the format
+/// forbids and other viewers read.
+pub(super) fn read(json: &[u8], warnings: &mut Warnings) -> Check<Value> {
     // The specification forbids a byte order mark; some editors add one all the same.
-    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    let mut json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    while let Some(rest) = json.strip_suffix(b"\0") {
+        json = rest;
+        warnings.push("its JSON ends in NUL characters instead of spaces, which glTF forbids; they are skipped".into());
+    }
     let mut value: Value = serde_json::from_slice(json).map_err(|error| {
         format!("isn't glTF: neither .glb nor JSON ({error}); give a .gltf or .glb file, or export it again")
     })?;
     normalise(&mut value);
+    normalise_colors(&mut value, warnings);
     Ok(value)
 }
 
@@ -36,6 +48,38 @@ fn normalise(value: &mut Value) {
             }
         }
         _ => (),
+    }
+}
+
+/// Colours that are integers are fractions, whether or not they say so.
+fn normalise_colors(root: &mut Value, warnings: &mut Warnings) {
+    let elements = |value: &Value, name: &str| value.get(name).and_then(Value::as_array).cloned().unwrap_or_default();
+    let mut colors = BTreeSet::new();
+    for primitive in elements(root, "meshes")
+        .iter()
+        .flat_map(|mesh| elements(mesh, "primitives"))
+    {
+        let attributes = primitive.get("attributes").and_then(Value::as_object);
+        let of_colors = attributes
+            .into_iter()
+            .flatten()
+            .filter(|(name, _)| name.starts_with("COLOR_"));
+        colors.extend(of_colors.filter_map(|(_, accessor)| accessor.as_u64()));
+    }
+    let accessors = root.get_mut("accessors").and_then(Value::as_array_mut);
+    for (index, accessor) in (0..).zip(accessors.into_iter().flatten()) {
+        let is_integer = matches!(accessor["componentType"].as_u64(), Some(U8 | U16));
+        let Some(members) = accessor.as_object_mut() else {
+            continue;
+        };
+        let is_normalized = members.get("normalized") == Some(&Value::Bool(true));
+        if colors.contains(&index) && is_integer && !is_normalized {
+            members.insert("normalized".to_owned(), Value::Bool(true));
+            warnings.push(format!(
+                "accessor {index}: its colours are integers that aren't normalized, which glTF forbids; they are read as if they \
+                 were, as other viewers do"
+            ));
+        }
     }
 }
 

@@ -47,9 +47,9 @@ impl Scene {
 }
 
 fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
-    let document = Document::read(path)?;
-    let root = &document.root;
     let mut warnings = Warnings::default();
+    let document = Document::read(path, &mut warnings)?;
+    let root = &document.root;
     let pose = match options.frame_time {
         Some(time) => Pose::at(&document, time, &mut warnings)?,
         None => Pose::default(),

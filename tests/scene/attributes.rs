@@ -66,7 +66,11 @@ fn colours_are_read_and_white_elsewhere() {
     let colors = room.add_accessor(&[0, 51, 102, 153].repeat(4), 4, 5121, "VEC4");
     room.set(&format!("/accessors/{colors}/normalized"), json!(true));
     room.set("/meshes/0/primitives/0/attributes/COLOR_0", json!(colors));
-    assert!(room.scene().colors[0].abs_diff_eq(Vec4::new(0.0, 0.2, 0.4, 0.6), 1e-7));
+    let color = Vec4::new(0.0, 0.2, 0.4, 0.6);
+    assert!(room.scene().colors[0].abs_diff_eq(color, 1e-7));
+    room.remove(&format!("/accessors/{colors}/normalized"));
+    let scene = room.assert_warns(&["accessor", "colours", "aren't normalized"]);
+    assert!(scene.colors[0].abs_diff_eq(color, 1e-7));
 }
 
 #[test]

@@ -300,3 +300,16 @@ fn a_version_that_is_a_number_and_a_value_of_a_wrong_type_are_named_with_their_p
     room.set("/nodes/0/mesh", json!("floor"));
     room.assert_fails(&["isn't glTF 2.0", "nodes[0].mesh"]);
 }
+
+#[test]
+fn json_that_ends_in_nul_characters_loads_with_a_warning() {
+    let room = Fixture::room();
+    room.scene();
+    let json = [room.json.to_string().as_bytes(), b"\0\0\0"].concat();
+    let scene = room.load_bytes("padded.gltf", &json).expect("a scene");
+    assert!(
+        scene.warnings.iter().any(|line| line.contains("NUL")),
+        "{:?}",
+        scene.warnings
+    );
+}
