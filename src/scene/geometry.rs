@@ -130,7 +130,8 @@ pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut W
     }
     builder.complete_attributes();
     let geometry = builder.geometry;
-    if geometry.triangles.is_empty() {
+    // Triangles to be shared may be left that no object shows.
+    if geometry.objects.is_empty() {
         return Err(
             "no triangles: all of them are too narrow to have an area in the scene's size; nothing is left to render"
                 .into(),

@@ -144,3 +144,22 @@ fn few_triangles_and_flat_or_tiny_instances_have_triangles_of_their_own() {
         assert!(scene.positions[corner as usize].abs().cmple(Vec3::ONE).all());
     }
 }
+
+/// One vertex far away makes the scene so large that nothing of it is left, though the fan has triangles in its own space.
+#[test]
+fn a_scene_whose_shared_triangles_vanish_with_all_others_is_refused() {
+    let mut room = Fixture::room();
+    let mut vertices = vec![[0.25, 0.0, 0.25]; 42];
+    for (i, vertex) in (0u16..).zip(&mut vertices) {
+        let angle = f32::from(i) * 0.1;
+        *vertex = [0.1 * angle.cos(), 0.1 * angle.sin(), 0.02 * angle];
+    }
+    vertices[20] = [3.4e10, 0.0, 0.0];
+    let positions = room.add_vectors(&vertices);
+    let primitive = json!({"attributes": {"POSITION": positions}, "mode": 6, "material": 0});
+    room.set("/meshes/-", json!({"primitives": [primitive]}));
+    room.set("/scenes/0/nodes", json!([2]));
+    room.add_root(json!({"mesh": 2}));
+    room.add_root(json!({"mesh": 2, "rotation": [0.1143, 0.2286, 0.2286, 0.9394], "scale": [-1, 1, 1]}));
+    room.assert_fails(&["no triangles", "too narrow"]);
+}
