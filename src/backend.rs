@@ -52,8 +52,8 @@ pub trait Backend {
 pub struct Resolved {
     /// The picture.
     pub image: Image,
-    /// Of each pixel, its photons' flux weighed with 1 − 2 distance²/R², as radiance: see [`crate::estimate`]. Infinite where
-    /// no photon has come yet to a surface that isn't in the open.
+    /// Of each pixel, its photons' flux weighed with 1 − 2 distance²/R², as radiance; infinite where no photon has come yet to a
+    /// surface that isn't in the open, which is all that the estimate reads of it.
     pub curvature: Vec<f32>,
     /// Of each pixel, what tells whether it has its part of the light behind glass.
     pub behind_glass: Vec<BehindGlass>,

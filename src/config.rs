@@ -153,10 +153,15 @@ pub const MAX_SIDE: u32 = 16384;
 
 /// Sequences of random numbers of low discrepancy that iterations take turns with: iteration i has the next numbers of
 /// sequence i mod 4. They are independent of each other, so that their spread tells the picture's error
-/// ([`crate::estimate`]), and go on through the whole render, so that each converges nearly as fast as one for all would.
+/// ([`crate::estimate`]), and those of pixels go on through the whole render, so that each converges nearly as fast as one for all would.
 pub const SEQUENCES: u32 = 4;
 
-/// Paths of a pixel in an iteration at the most: what they don't cost much beside so many photon paths.
+/// How many of so many iterations are of a sequence.
+pub fn iterations_of(sequence: u32, iterations: u32) -> u32 {
+    iterations / SEQUENCES + u32::from(sequence < iterations % SEQUENCES)
+}
+
+/// Paths of a pixel in an iteration at the most: so many cost little beside as many photon paths.
 const MOST_CAMERA_PATHS: u32 = 8;
 
 impl RenderConfig {

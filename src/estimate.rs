@@ -163,8 +163,8 @@ impl ErrorEstimate {
                 noise2: channels.each_ref().map(|spread| spread.noise2() + photon2),
                 relative_noise2: std::array::from_fn(|channel| {
                     let spread = &channels[channel];
-                    spread.relative_noise2(mean_around(channel, spread.mean), floor)
-                        + photon2 / (spread.mean.powi(2) + floor)
+                    let value = f64::from(picture.image.pixels()[pixel][channel]);
+                    spread.relative_noise2(mean_around(channel, value), floor) + photon2 / (spread.mean.powi(2) + floor)
                 }),
                 photon2,
                 own: own_part(&curvature, &channels),

@@ -107,7 +107,7 @@ impl Random {
         Self {
             sequence: pixel,
             block: iteration % SEQUENCES,
-            index: iteration / SEQUENCES * paths + path,
+            index: (iteration / SEQUENCES).wrapping_mul(paths).wrapping_add(path),
             ..Self::with(
                 config.sampler,
                 kind,

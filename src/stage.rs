@@ -46,8 +46,14 @@ pub enum BufferId {
     GatheredOf,
     /// [`crate::layout::DirectSum`] of each slot.
     DirectSums,
-    /// Radiance (RGB and curvature) that each slot had in the iterations of a sequence, for each of [`crate::config::SEQUENCES`].
-    SequenceSums,
+    /// Radiance (RGB and curvature) that each slot had in the iterations of a sequence, summed up in f32: for their spread.
+    Sequence0Sums,
+    /// Likewise of the next one.
+    Sequence1Sums,
+    /// Likewise.
+    Sequence2Sums,
+    /// Likewise.
+    Sequence3Sums,
     /// [`crate::layout::Coverage`] of each slot, for each photon map.
     CoverageOf,
     /// Side of each slot's pixel where its visible point is, f32.
@@ -130,13 +136,23 @@ pub enum BufferId {
     Film,
     /// [`crate::layout::BehindGlass`] of each pixel, row-major from the top left.
     GlassFilm,
-    /// As [`BufferId::Film`], the mean of the iterations of each of [`crate::config::SEQUENCES`] alone, one after another.
-    SequenceFilm,
+    /// As [`BufferId::Film`], by the iterations of a sequence alone.
+    Sequence0Film,
+    /// Likewise of the next one.
+    Sequence1Film,
+    /// Likewise.
+    Sequence2Film,
+    /// Likewise.
+    Sequence3Film,
     /// [`crate::layout::StatusCounters`].
     Status,
 
     /// Parameter: the numbers that a prefix sum is taken of.
     Scan,
+    /// Parameter: one of [`SEQUENCE_SUMS`].
+    SequenceSums,
+    /// Parameter: one of [`SEQUENCE_FILMS`].
+    SequenceFilm,
     /// Parameter: the photons that are gathered.
     GatheredFrom,
     /// Parameter: the order that is made.
@@ -152,6 +168,21 @@ pub enum BufferId {
     /// Parameter: values after a sort pass.
     ValuesOut,
 }
+
+/// Of each sequence.
+pub const SEQUENCE_SUMS: [BufferId; 4] = [
+    BufferId::Sequence0Sums,
+    BufferId::Sequence1Sums,
+    BufferId::Sequence2Sums,
+    BufferId::Sequence3Sums,
+];
+/// Of each sequence.
+pub const SEQUENCE_FILMS: [BufferId; 4] = [
+    BufferId::Sequence0Film,
+    BufferId::Sequence1Film,
+    BufferId::Sequence2Film,
+    BufferId::Sequence3Film,
+];
 
 /// How a shader uses a buffer, from the block's qualifiers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

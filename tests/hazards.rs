@@ -115,6 +115,10 @@ fn stages_that_share_no_written_buffer_run_without_a_barrier() {
     recording.fill(BufferId::Status, 0);
     recording.fill(BufferId::DirectSums, 0);
     assert_eq!(recording.commands().len(), 2);
-    recording.dispatch(StageDesc::new(&shaders::DIRECT, 64).push([0u32, 0, 1]));
+    recording.dispatch(
+        StageDesc::new(&shaders::DIRECT, 64)
+            .push([0u32, 0, 1])
+            .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
+    );
     assert_eq!(recording.commands().len(), 4, "a write before a read needs one barrier");
 }

@@ -30,7 +30,7 @@ struct Random {
     uint iteration;
     uint seed;      // the user's, mixed with the kind of path
     uint dimension; // how many quadruples have been drawn
-    uint sequence;  // of low discrepancy: a pixel's own, or that of all photons
+    uint sequence;  // of low discrepancy: a pixel's own, or one of all photons
     uint block;     // of iterations whose numbers are one sequence
     uint index;     // in that sequence
     uint state;     // of the congruential generator

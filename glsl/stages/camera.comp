@@ -99,7 +99,7 @@ void reflect_branch(inout Branch branch, Reflector reflector, Facing facing, vec
 
 void main() {
     uint pixel_slot = invocation_index();
-    if (pixel_slot >= pixel_slots()) {
+    if (pixel_slot >= pixel_slots() || status.again != 0u) {
         return;
     }
     uvec2 pixel = pixel_of(pixel_slot);

@@ -39,7 +39,7 @@ uniform usamplerBuffer GlossOf;
 uniform usamplerBuffer StatisticsOf;
 uniform usamplerBuffer NearLights;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
-layout(std430) buffer SequenceSums { vec4 sequence_sums[]; };
+layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteration's sequence
 
 // A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
 const float ENDS_BEFORE = 16.0 / 16777216.0;
@@ -275,5 +275,5 @@ void main() {
     sum.high.w += unbent;
     sum.low.w += asks ? 1.0 : 0.0;
     direct_sums[slot] = sum;
-    sequence_sums[(push.iteration % SEQUENCES) * slots() + slot].rgb += radiance;
+    sequence_sums[slot].rgb += radiance;
 }

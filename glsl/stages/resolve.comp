@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // The paper's image synthesis: eq. 4 for each visible point, and the mean of what was seen directly. And what tells how much light
-// behind glass no photon has brought yet; and the picture of each sequence alone.
+// behind glass no photon has brought yet.
 
 layout(local_size_x = 64) in;
 
@@ -22,10 +22,8 @@ uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
 layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
-layout(std430) readonly buffer SequenceSums { vec4 sequence_sums[]; };
 layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left
 layout(std430) writeonly buffer GlassFilm { BehindGlass glass_film[]; }; // likewise
-layout(std430) writeonly buffer SequenceFilm { vec4 sequence_film[]; }; // likewise, one picture after another
 
 // 64 bits: a carry of the low words is one more high one.
 void add_accepted(uint low, uint high) {
@@ -94,14 +92,4 @@ void main() {
     uint index = pixel.y * settings.resolution.x + pixel.x;
     glass_film[index] = glass;
     film[index] = radiance;
-    for (uint sequence = 0u; sequence < SEQUENCES; sequence++) {
-        vec4 sum = vec4(0.0);
-        for (uint i = 0u; i < settings.slots_per_pixel; i++) {
-            sum += sequence_sums[sequence * slots() + pixel_slot * settings.slots_per_pixel + i];
-        }
-        uint iterations = (push.iterations + SEQUENCES - 1u - sequence) / SEQUENCES;
-        vec4 mean = sum / float(max(iterations, 1u));
-        bool is_sound = finite(mean.rgb) && !isnan(mean.w) && !isinf(mean.w);
-        sequence_film[sequence * settings.resolution.x * settings.resolution.y + index] = is_sound ? mean : vec4(0.0);
-    }
 }

@@ -15,17 +15,14 @@ layout(local_size_x = 64) in;
 #include "radius.glsl"
 #include "status.glsl"
 
-layout(push_constant) uniform Push {
-    uint iteration;
-    float photons; // paths of an iteration
-} push;
+layout(push_constant) uniform Push { float photons; } push; // paths of an iteration
 
 uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer Radii2 { float radii2[]; };
 layout(std430) buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
-layout(std430) buffer SequenceSums { vec4 sequence_sums[]; };
+layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteration's sequence
 
 // Radiance (RGB and curvature) that one iteration's photons of a map give a visible point.
 vec4 update_map(uint receiver, vec3 weight) {
@@ -62,6 +59,6 @@ void main() {
         radiance += update_map(map * slots() + slot, visible_point.weight_normal.rgb);
     }
     if (radiance != vec4(0.0)) {
-        sequence_sums[(push.iteration % SEQUENCES) * slots() + slot] += radiance;
+        sequence_sums[slot] += radiance;
     }
 }

@@ -1,11 +1,11 @@
 //! Every buffer size and group count, and the numbers that they follow from.
 
-use super::{EmissionChoice, Estimator, RenderConfig, SEQUENCES};
+use super::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
     BehindGlass, Coverage, DirectSum, EmissionCell, Gathered, Gloss, GridShape, Photon, SHELLS, ShellRadii, Statistics,
     StatusCounters, VisiblePoint,
 };
-use crate::stage::BufferId;
+use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
 
 /// Pixels of a tile's side: visible points lie in memory tile by tile.
 pub const TILE: u32 = 8;
@@ -237,7 +237,7 @@ impl Sizes {
             BufferId::StatisticsOf => (receivers, size_of::<Statistics>()),
             BufferId::GatheredOf => (receivers, size_of::<Gathered>()),
             BufferId::DirectSums => (slots, size_of::<DirectSum>()),
-            BufferId::SequenceSums => (u64::from(SEQUENCES) * slots, 16),
+            id if SEQUENCE_SUMS.contains(&id) => (slots, 16),
             BufferId::CoverageOf => (receivers, size_of::<Coverage>()),
             BufferId::TestsOf => (if self.probe.count_tests { receivers } else { 1 }, 4),
             BufferId::Footprints => (slots, 4),
@@ -246,7 +246,7 @@ impl Sizes {
             BufferId::Radii2 => (receivers, 4),
             BufferId::RadiiOfShells => (2 * SHELLS as u64, size_of::<ShellRadii>()),
             BufferId::Film => (pixels, 16),
-            BufferId::SequenceFilm => (u64::from(SEQUENCES) * pixels, 16),
+            id if SEQUENCE_FILMS.contains(&id) => (pixels, 16),
             BufferId::GlassFilm => (pixels, size_of::<BehindGlass>()),
             BufferId::Status => (1, size_of::<StatusCounters>()),
             BufferId::Grid => (1, size_of::<GridShape>()),

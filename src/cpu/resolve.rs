@@ -7,7 +7,7 @@ use glam::{DVec3, DVec4};
 
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{from_two_float, from_two_floats, word, xyz};
-use crate::config::SEQUENCES;
+use crate::config::{SEQUENCES, iterations_of};
 use crate::layout::{BehindGlass, Coverage, DirectSum, NO_OBJECT, Settings, Statistics, VisiblePoint};
 
 /// The part of the discs that can have photons; 1 where nothing is known of it.
@@ -27,11 +27,14 @@ pub fn resolve_sequences(settings: &Settings, sums: &[[f32; 4]], iterations: u32
     let pictures = film.chunks_mut(width * height);
     let sequences = sums.chunks(pixel_slots(settings) * slots_per_pixel);
     for (sequence, (picture, sums)) in (0..).zip(pictures.zip(sequences)) {
-        let iterations = f64::from((iterations + SEQUENCES - 1 - sequence) / SEQUENCES);
+        let iterations = f64::from(iterations_of(sequence, iterations));
         for (pixel_slot, slots) in (0..).zip(sums.chunks(slots_per_pixel)) {
             if let Some([x, y]) = pixel_of(settings.resolution, pixel_slot) {
                 let sum: DVec4 = slots.iter().map(|sum| DVec4::from(sum.map(f64::from))).sum();
-                picture[y as usize * width + x as usize] = (sum / iterations.max(1.0)).as_vec4().to_array();
+                let mean = sum / iterations.max(1.0);
+                if mean.is_finite() {
+                    picture[y as usize * width + x as usize] = mean.as_vec4().to_array();
+                }
             }
         }
     }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// is off by h²/12 in the mean. A slanted edge has 40, a line thinner than a pixel 6.
 const BEND_OVER_CENTRE: f64 = 24.0;
 
-/// What the pictures of a render say of its errors.
+/// What the picture and those of its sequences say of its errors.
 #[derive(Debug)]
 pub(super) struct Parts {
     pub width: usize,
@@ -23,7 +23,7 @@ pub(super) struct Parts {
 /// The same of a pixel's channels.
 #[derive(Debug)]
 pub(super) struct OfPixel {
-    /// As the last picture has them.
+    /// By all sequences together.
     pub values: [f64; 3],
     /// Squared standard errors.
     pub noise2: [f64; 3],

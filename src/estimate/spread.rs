@@ -1,6 +1,6 @@
 //! What a pixel has by each sequence alone.
 
-use crate::config::SEQUENCES;
+use crate::config::{SEQUENCES, iterations_of};
 
 const COUNT: usize = SEQUENCES as usize;
 
@@ -11,10 +11,8 @@ pub(super) struct Weights([f64; COUNT]);
 impl Weights {
     /// After so many iterations.
     pub fn of(iterations: u32) -> Self {
-        let of_sequence = |sequence: usize| {
-            let own = (iterations + SEQUENCES - 1 - sequence as u32) / SEQUENCES;
-            f64::from(own) / f64::from(iterations)
-        };
+        let of_sequence =
+            |sequence: usize| f64::from(iterations_of(sequence as u32, iterations)) / f64::from(iterations);
         Self(std::array::from_fn(of_sequence))
     }
 }
@@ -37,7 +35,8 @@ impl Spread {
         let of_sequence =
             |(&weight, &value): (&f64, &f64)| (weight * (value - self.mean)).powi(2) / divisor(weight, value);
         let squares: f64 = self.weights.iter().zip(&self.values).map(of_sequence).sum();
-        squares * COUNT as f64 / (COUNT - 1) as f64
+        // What the spread lacks since the mean is that of the values themselves.
+        squares / (1.0 - self.weights.iter().map(|weight| weight * weight).sum::<f64>())
     }
 
     /// Squared standard error of the mean.
@@ -65,7 +64,7 @@ mod tests {
         let spread = Spread::of(Weights::of(6), [3.0, 3.0, 0.0, 0.0]);
         assert_eq!(spread.mean, 2.0);
         // Two sequences of a third each are off by 1, two of a sixth by 2.
-        let expected = 4.0 / 3.0 * 4.0 / 9.0;
+        let expected = 8.0 / 13.0;
         assert!((spread.noise2() - expected).abs() < 1e-12, "{}", spread.noise2());
     }
 }

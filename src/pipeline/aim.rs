@@ -24,15 +24,15 @@ impl Renderer {
         }
         let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
         let config = self.config.clone();
-        let paths = self.sizes.pilot_paths(config.photons);
         let aim = Aim::by_pilots(&config, scene, &visible_points, |table, iteration| {
             self.upload_table(table)?;
             self.run_until_it_fits(|stages| {
                 let mut recording = reporting();
+                let paths = stages.sizes.pilot_paths(stages.config.photons);
                 stages.trace_paths(iteration, 0..paths, &mut recording);
                 recording
             })?;
-            self.path_values(iteration, paths)
+            self.path_values(iteration, self.sizes.pilot_paths(config.photons))
         })?;
         self.sizes.aimed = aim.is_some();
         if let Some(aim) = &aim {

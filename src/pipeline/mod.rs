@@ -19,7 +19,7 @@ use crate::layout::{GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Setti
 use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
 use crate::scene::{Camera, PackedScene, SceneFeatures};
-use crate::stage::BufferId;
+use crate::stage::{BufferId, SEQUENCE_FILMS};
 use stages::{method_stages, reporting};
 
 /// A progressive render on a device.
@@ -226,7 +226,10 @@ impl Renderer {
         self.counters.photons_accepted = status.photons_accepted();
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
         let behind_glass = self.device.download(BufferId::GlassFilm, None)?;
-        let sequences = self.device.download(BufferId::SequenceFilm, None)?;
+        let mut sequences = Vec::new();
+        for film in SEQUENCE_FILMS {
+            sequences.extend(self.device.download::<[f32; 4]>(film, None)?);
+        }
         let resolved = Resolved::from_film(self.config.resolution, &film, behind_glass, sequences);
         Ok((run, resolved))
     }

@@ -8,7 +8,7 @@ use crate::layout::{Photon, Statistics, VisiblePoint};
 use crate::random::CameraTurn;
 use crate::record::Recording;
 use crate::scene::PackedScene;
-use crate::stage::{BufferId, StageDesc};
+use crate::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
 use crate::{radius, shaders};
 
 impl Renderer {
@@ -86,7 +86,9 @@ impl Renderer {
     fn reset(&mut self) -> Result<()> {
         let mut recording = reporting();
         recording.fill(BufferId::DirectSums, 0);
-        recording.fill(BufferId::SequenceSums, 0);
+        for sums in SEQUENCE_SUMS {
+            recording.fill(sums, 0);
+        }
         recording.fill(BufferId::CoverageOf, 0);
         recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.receivers()));
         self.run(&recording).map(|_| ())

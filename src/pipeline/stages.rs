@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-use crate::config::{Accel, Direct, Estimator, RenderConfig, Sizes, TriangleTest};
+use crate::config::{Accel, Direct, Estimator, RenderConfig, SEQUENCES, Sizes, TriangleTest, iterations_of};
 use crate::gather::{METHODS, Record, default_method, grid_sizes, scan};
 use crate::random::CameraTurn;
 use crate::record::Recording;
 use crate::scene::SceneFeatures;
 use crate::shaders;
-use crate::stage::{BufferId, Shader, StageDesc};
+use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS, Shader, StageDesc};
 
 /// The stages of a render, as data: what an iteration runs, without a device.
 #[derive(Clone, Copy)]
@@ -25,6 +25,11 @@ pub struct Stages<'a> {
 pub(super) fn method_stages(method: usize) -> (Record, Record) {
     let nothing: Record = |_, _| ();
     METHODS[method].stages().unwrap_or((nothing, nothing))
+}
+
+/// The sums of an iteration's sequence, for stages that add to them.
+fn sums_of(iteration: u32) -> (BufferId, BufferId) {
+    (BufferId::SequenceSums, SEQUENCE_SUMS[(iteration % SEQUENCES) as usize])
 }
 
 /// A recording whose stages report into a status of their own.
@@ -61,7 +66,8 @@ impl Stages<'_> {
         }
         recording.dispatch(
             StageDesc::new(&shaders::UPDATE, self.sizes.slots())
-                .push([iteration, (self.config.photons as f32).to_bits()]),
+                .push([self.config.photons as f32])
+                .bind(vec![sums_of(iteration)]),
         );
         // After the photons: an iteration that has to be done again stops before it has added anything.
         for turn in turn.others() {
@@ -76,6 +82,13 @@ impl Stages<'_> {
         let mut recording = reporting();
         let push = [iterations, (emitted as f32).to_bits()];
         recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
+        for (sequence, (sums, film)) in (0..).zip(SEQUENCE_SUMS.into_iter().zip(SEQUENCE_FILMS)) {
+            recording.dispatch(
+                StageDesc::new(&shaders::RESOLVE_SEQUENCE, self.sizes.pixel_slots)
+                    .push([iterations_of(sequence, iterations)])
+                    .bind(vec![(BufferId::SequenceSums, sums), (BufferId::SequenceFilm, film)]),
+            );
+        }
         recording
     }
 
@@ -96,7 +109,7 @@ impl Stages<'_> {
     fn direct(&self, turn: CameraTurn, asks: bool, recording: &mut Recording) {
         let mut direct = self.ray_stage(&shaders::DIRECT, self.sizes.slots());
         direct.constants.to_mut().push(("ASKS_BEHIND_GLASS", u32::from(asks)));
-        recording.dispatch(direct.push(turn.words()));
+        recording.dispatch(direct.push(turn.words()).bind(vec![sums_of(turn.iteration)]));
     }
 
     /// The radii that the visible points gather within, and the grids that suit them.

@@ -29,11 +29,13 @@ impl NearLights<'_> {
     /// A sphere around each source that rays can meet: its centre, and the squared radius of what is near it. An environment is
     /// near everywhere.
     pub fn spheres(&self) -> Vec<[f32; 4]> {
+        if self.environment.is_some() {
+            return vec![[0.0, 0.0, 0.0, f32::INFINITY]];
+        }
         let sphere = |source: &Range<u32>| {
             let lights = &self.lights[source.start as usize..source.end as usize];
             match lights[0].kind {
                 TRIANGLE_LIGHT => self.around(lights),
-                ENVIRONMENT_LIGHT => Some([0.0, 0.0, 0.0, f32::INFINITY]),
                 _ => None,
             }
         };

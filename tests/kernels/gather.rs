@@ -108,8 +108,12 @@ fn assert_methods_agree_on(
 
         let mut recording = Recording::new();
         recording.fill(BufferId::Status, 0);
-        let push = [0, (bench.config.photons as f32).to_bits()];
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, points.len() as u32).push(push));
+        let update = StageDesc::new(&shaders::UPDATE, points.len() as u32);
+        recording.dispatch(
+            update
+                .push([bench.config.photons as f32])
+                .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
+        );
         bench
             .renderer
             .run(&recording)

@@ -11,7 +11,7 @@ use ppm_vk::layout::{
 };
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
-use ppm_vk::stage::{BufferId, StageDesc};
+use ppm_vk::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
 
 use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, photon, random_numbers, scene, small, visible_point};
@@ -72,7 +72,11 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     for _ in 0..500 {
         recording.dispatch(StageDesc::new(&shaders::RADII, 64));
         naive(bench.renderer.sizes(), &mut recording);
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, 64).push([0, 1f32.to_bits()]));
+        recording.dispatch(
+            StageDesc::new(&shaders::UPDATE, 64)
+                .push([1f32])
+                .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
+        );
     }
     for _ in 0..ITERATIONS / 500 {
         bench.renderer.run(&recording).expect("a run");
@@ -365,7 +369,10 @@ fn pictures_are_resolved_by_equation_4() {
             }
         }
         assert!(behind_glass.iter().filter(|glass| glass.radius > 0.0).count() > 20);
-        let sums: Vec<[f32; 4]> = bench.download(BufferId::SequenceSums);
+        let sums: Vec<[f32; 4]> = SEQUENCE_SUMS
+            .into_iter()
+            .flat_map(|sums| bench.download(sums))
+            .collect();
         let sequences = cpu::resolve_sequences(&bench.settings, &sums, iterations);
         for (index, (found, expected)) in resolved.sequences.iter().zip(&sequences).enumerate() {
             for (found, expected) in found.iter().zip(expected) {

@@ -149,7 +149,8 @@ fn direct_on_device(bench: &mut Bench, turn: CameraTurn) -> Vec<DirectSum> {
     recording.dispatch(
         StageDesc::new(&shaders::DIRECT, slots)
             .constants(constants)
-            .push(turn.words()),
+            .push(turn.words())
+            .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
     );
     bench.renderer.run(&recording).expect("a run");
     bench.download(BufferId::DirectSums)

@@ -201,7 +201,18 @@ fn assert_falls_as_theory_says(name: &str, alpha: f32, radius: f64, iterations: 
     let what = format!("{name}, α {alpha:.3}");
     Slope::of(&errors, noise).assert_between(expected, expected, &format!("{what}, noise"));
     let (smooth, edges) = (-2.0 * (1.0 - alpha), -0.5 * (1.0 - alpha));
-    Slope::of(&errors, squared_bias).assert_between(smooth, edges, &format!("{what}, squared bias"));
+    let slope = Slope::of(&errors, squared_bias);
+    if slope.chance.is_nan() {
+        // Of some squares it is less than chance makes of it, or of the reference's own error: it has no slope.
+        for error in &errors {
+            let sum =
+                |part: &dyn Fn(&Errors, usize) -> f64| (0..SQUARES).map(|square| part(error, square)).sum::<f64>();
+            let (bias, all) = (sum(&squared_bias), sum(&total));
+            assert!(bias < all / 7.0, "{what}: squared bias {bias:e} of {all:e}");
+        }
+    } else {
+        slope.assert_between(smooth, edges, &format!("{what}, squared bias"));
+    }
     let slope = Slope::of(&errors, total).value;
     println!("{what}, relMSE: slope {slope:.3}");
     (slope, last.ratio_of_means)

@@ -110,7 +110,11 @@ fn iterate(bench: &mut Bench, iterations: u32, arriving: impl Fn(u32) -> u32) {
     for _ in 0..at_once {
         naive(bench.renderer.sizes(), &mut recording);
         recording.dispatch(StageDesc::new(&shaders::RADII, SLOTS));
-        recording.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS).push([0, 1f32.to_bits()]));
+        recording.dispatch(
+            StageDesc::new(&shaders::UPDATE, SLOTS)
+                .push([1f32])
+                .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
+        );
     }
     for _ in 0..iterations / at_once {
         bench.renderer.run(&recording).expect("a run");
@@ -161,7 +165,11 @@ fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
     };
     let mut update = Recording::new();
     update.dispatch(StageDesc::new(&shaders::RADII, SLOTS));
-    update.dispatch(StageDesc::new(&shaders::UPDATE, SLOTS).push([0, 1f32.to_bits()]));
+    update.dispatch(
+        StageDesc::new(&shaders::UPDATE, SLOTS)
+            .push([1f32])
+            .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
+    );
     let mut exact = Exact::START;
     for _ in 0..ITERATIONS {
         bench.upload(BufferId::GatheredOf, &[gathered]);
