@@ -170,3 +170,33 @@ fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing()
         );
     }
 }
+
+/// Pilot paths leave ten times as many photons as a path is expected to: rounds are done again in smaller batches, and what is
+/// learned from is no longer than those.
+#[test]
+fn pilot_paths_whose_photons_do_not_fit_are_learned_from_in_smaller_batches() {
+    const PATHS: u32 = 20_000;
+    let mut model = Model::new();
+    let white = model.matte([1.0; 3], 1.0);
+    model.room(white, Vec3::NEG_ONE, Vec3::ONE);
+    model.camera(Vec3::Z * 0.5, Vec3::ZERO, 1.0);
+    let scene = model.scene();
+    let config = RenderConfig {
+        direct: Direct::Photons,
+        radius: Some(0.2),
+        emission: EmissionChoice::Aimed,
+        aims_anyway: true,
+        drop_unwanted: false,
+        max_depth: 50,
+        ..square(16, PATHS)
+    };
+    let free = render(&scene, 0, 2, config.clone());
+    let tight = render_within(Some(u64::from(PATHS / 10) * 50), &scene, 0, 2, config);
+    let sizes = tight.renderer.sizes();
+    println!("{} paths in a batch", sizes.batch_paths);
+    assert!(tight.renderer.aim().is_some(), "nothing was aimed");
+    assert!((20..1000).contains(&sizes.batch_paths), "{sizes:?}");
+    let mean = |image| ppm_vk::metrics::mean(image)[0];
+    let ratio = mean(&tight.image) / mean(&free.image);
+    assert!((ratio - 1.0).abs() < 0.03, "{ratio} of the light");
+}
