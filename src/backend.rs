@@ -159,8 +159,7 @@ impl Counters {
 
 /// What relMSE has beside the squared radiance, of the picture so far; 1 of a black one. Photons are wanted by this measure.
 pub fn demand_floor2(picture: &Image) -> f32 {
-    let mean = metrics::mean(picture).iter().sum::<f64>() / 3.0;
-    let floor2 = metrics::REL_MSE_FLOOR * mean * mean;
+    let floor2 = metrics::floor_of(picture);
     if floor2 > 0.0 { floor2 as f32 } else { 1.0 }
 }
 

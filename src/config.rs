@@ -153,7 +153,8 @@ pub const MAX_SIDE: u32 = 16384;
 
 /// Sequences of random numbers of low discrepancy that iterations take turns with: iteration i has the next numbers of
 /// sequence i mod 4. They are independent of each other, so that their spread tells the picture's error
-/// ([`crate::estimate`]), and those of pixels go on through the whole render, so that each converges nearly as fast as one for all would.
+/// ([`crate::estimate`]), and those of pixels go on through the whole render, so that each converges nearly as fast as one for
+/// all would.
 pub const SEQUENCES: u32 = 4;
 
 /// How many of so many iterations are of a sequence.

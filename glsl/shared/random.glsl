@@ -46,6 +46,9 @@ Random random_for(uint kind, uint path, uint iteration, uint block, uint sequenc
     return Random(path, iteration, mixed, 0u, sequence, block, index, mixed + iteration * 0x9e3779b1u + path);
 }
 
+// Iterations take turns with so many sequences: see config::SEQUENCES.
+const uint SEQUENCES = 4u;
+
 // Of an iteration's paths of a pixel, or of what one of them leads to.
 struct CameraTurn {
     uint iteration;

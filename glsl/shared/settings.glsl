@@ -1,6 +1,3 @@
-// Iterations take turns with so many sequences of random numbers: see config::SEQUENCES.
-const uint SEQUENCES = 4u;
-
 // What stays the same through a render. Mirrors `layout::Settings`.
 layout(std140) uniform Settings {
     vec4 camera_position;       // w: radius of the lens

@@ -78,10 +78,16 @@ impl Stages<'_> {
     }
 
     /// The commands that make the picture, after so many iterations and photon paths.
-    pub fn picture(&self, iterations: u32, emitted: u64) -> Recording {
+    pub fn film(&self, iterations: u32, emitted: u64) -> Recording {
         let mut recording = reporting();
         let push = [iterations, (emitted as f32).to_bits()];
         recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
+        recording
+    }
+
+    /// The same, and the pictures of the sequences.
+    pub fn picture(&self, iterations: u32, emitted: u64) -> Recording {
+        let mut recording = self.film(iterations, emitted);
         for (sequence, (sums, film)) in (0..).zip(SEQUENCE_SUMS.into_iter().zip(SEQUENCE_FILMS)) {
             recording.dispatch(
                 StageDesc::new(&shaders::RESOLVE_SEQUENCE, self.sizes.pixel_slots)

@@ -19,9 +19,10 @@ const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
 /// forbids and other viewers read.
 pub(super) fn read(json: &[u8], warnings: &mut Warnings) -> Check<Value> {
     // The specification forbids a byte order mark; some editors add one all the same.
-    let mut json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-    while let Some(rest) = json.strip_suffix(b"\0") {
-        json = rest;
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    let end = json.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    let (json, padding) = json.split_at(end);
+    if !padding.is_empty() {
         warnings.push("its JSON ends in NUL characters instead of spaces, which glTF forbids; they are skipped".into());
     }
     let mut value: Value = serde_json::from_slice(json).map_err(|error| {
@@ -51,14 +52,15 @@ fn normalise(value: &mut Value) {
     }
 }
 
+/// Of an array that is a member of a value; none where it isn't.
+fn elements<'a>(value: &'a Value, name: &str) -> impl Iterator<Item = &'a Value> + use<'a> {
+    value.get(name).and_then(Value::as_array).into_iter().flatten()
+}
+
 /// Colours that are integers are fractions, whether or not they say so.
 fn normalise_colors(root: &mut Value, warnings: &mut Warnings) {
-    let elements = |value: &Value, name: &str| value.get(name).and_then(Value::as_array).cloned().unwrap_or_default();
     let mut colors = BTreeSet::new();
-    for primitive in elements(root, "meshes")
-        .iter()
-        .flat_map(|mesh| elements(mesh, "primitives"))
-    {
+    for primitive in elements(root, "meshes").flat_map(|mesh| elements(mesh, "primitives")) {
         let attributes = primitive.get("attributes").and_then(Value::as_object);
         let of_colors = attributes
             .into_iter()

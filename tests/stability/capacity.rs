@@ -6,6 +6,7 @@ use ppm_vk::config::{Direct, EmissionChoice, Probe, RenderConfig};
 use ppm_vk::cpu;
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::scene::Scene;
 use ppm_vk::stage::BufferId;
 
 use super::bench::{Bench, object, photon, random_numbers, visible_point, xyz};
@@ -115,17 +116,22 @@ fn radii_that_differ_by_a_million_in_one_picture_find_their_photons() {
     );
 }
 
-/// A closed room that absorbs nothing: each path leaves as many photons as it may have bounces, forty times more than a lane
+/// A closed room that absorbs nothing.
+fn white_room() -> Scene {
+    let mut model = Model::new();
+    let white = model.matte([1.0; 3], 1.0);
+    model.room(white, Vec3::NEG_ONE, Vec3::ONE);
+    model.camera(Vec3::Z * 0.5, Vec3::ZERO, 1.0);
+    model.scene()
+}
+
+/// In a closed room that absorbs nothing each path leaves as many photons as it may have bounces, forty times more than a lane
 /// is given room for, and no buffer may be larger than a hundredth of them.
 #[test]
 fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing() {
     const DEPTH: u32 = 800;
     const PATHS: u32 = 256;
-    let mut model = Model::new();
-    let white = model.matte([1.0; 3], 1.0);
-    model.room(white, Vec3::NEG_ONE, Vec3::ONE);
-    model.camera(Vec3::Z * 0.5, Vec3::ZERO, 1.0);
-    let scene = model.scene();
+    let scene = white_room();
     let config = RenderConfig {
         direct: Direct::Photons,
         radius: Some(0.2),
@@ -176,11 +182,7 @@ fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing()
 #[test]
 fn pilot_paths_whose_photons_do_not_fit_are_learned_from_in_smaller_batches() {
     const PATHS: u32 = 20_000;
-    let mut model = Model::new();
-    let white = model.matte([1.0; 3], 1.0);
-    model.room(white, Vec3::NEG_ONE, Vec3::ONE);
-    model.camera(Vec3::Z * 0.5, Vec3::ZERO, 1.0);
-    let scene = model.scene();
+    let scene = white_room();
     let config = RenderConfig {
         direct: Direct::Photons,
         radius: Some(0.2),
