@@ -43,6 +43,8 @@ pub trait Backend {
     fn photon_flux(&self) -> Option<f64>;
     /// Whether photon paths are aimed.
     fn aims(&self) -> bool;
+    /// Photon maps: 2 where caustic photons are gathered apart from the others.
+    fn photon_maps(&self) -> u32;
     /// What it runs on.
     fn device(&self) -> DeviceDescription;
 }

@@ -9,9 +9,10 @@ mod fixture;
 mod picture;
 
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Estimator, RenderConfig};
+use ppm_vk::config::{Estimator, Limits, RenderConfig, Sizes};
 use ppm_vk::gpu::best_device;
-use ppm_vk::pipeline::Memory;
+use ppm_vk::pipeline::{Memory, Stages};
+use ppm_vk::scene::SceneFeatures;
 use serde_json::json;
 
 use fixture::Fixture;
@@ -87,4 +88,60 @@ fn a_thousand_instances_of_a_mesh_take_hardly_more_memory_than_one_node() {
     assert!(4 * bytes(&thousand) < 5 * bytes(&one));
     // And of the host.
     assert_eq!(thousand.scene.positions.len(), one.scene.positions.len());
+}
+
+/// lavapipe binds 128 MiB. Pictures of the default width, and larger ones, fit however much a scene asks of its visible points.
+#[test]
+fn pictures_of_usual_sizes_fit_what_a_small_device_binds() {
+    const BINDABLE: u64 = 128 << 20;
+    let limits = Limits {
+        storage_buffer_bytes: BINDABLE,
+        loop_limit: u32::MAX,
+        lanes: 4096,
+        splitting: true,
+        specular: true,
+        glossy: true,
+        meshes: 9,
+        object_cells: 9 * 1024,
+    };
+    let sides = [
+        [640, 480],
+        [560, 560],
+        [800, 600],
+        [1280, 720],
+        [1280, 1280],
+        [1920, 1080],
+        [1920, 1200],
+    ];
+    for (resolution, estimator) in sides
+        .iter()
+        .flat_map(|&side| [(side, Estimator::Sppm), (side, Estimator::Ppm)])
+    {
+        let config = RenderConfig {
+            resolution,
+            estimator,
+            ..RenderConfig::default()
+        };
+        let sizes = Sizes::new(&config, limits);
+        let stages = Stages {
+            config: &config,
+            sizes: &sizes,
+            features: SceneFeatures::ALL,
+        };
+        for recording in [stages.iteration(0), stages.picture(1, 1)] {
+            for id in recording.buffers() {
+                let bytes = sizes.bytes(id).unwrap_or_default();
+                assert!(
+                    bytes <= BINDABLE,
+                    "{resolution:?}, {estimator:?}: {id:?} has {bytes} bytes"
+                );
+            }
+        }
+        let caustics_apart = estimator == Estimator::Sppm && resolution[0] * resolution[1] < 1_300_000;
+        assert_eq!(
+            sizes.photon_maps,
+            1 + u32::from(caustics_apart),
+            "{resolution:?}, {estimator:?}"
+        );
+    }
 }

@@ -136,6 +136,7 @@ impl Sizes {
             Estimator::Ppm if limits.splitting => PPM_SLOTS.min(fitting.max(1) as u32),
             _ => 1,
         };
+        let two_maps = 2 * size_of::<Statistics>() as u64 * u64::from(pixel_slots);
         let photons_at_most = (limits.storage_buffer_bytes / size_of::<Photon>() as u64) as u32;
         let batch_paths = config
             .photons
@@ -153,11 +154,10 @@ impl Sizes {
             cell_bits: (batch_paths.ilog2() + 3).clamp(12, 24),
             meshes: limits.meshes,
             object_cells: limits.object_cells,
-            // The paper has one photon map.
-            photon_maps: if limits.specular && config.estimator == Estimator::Sppm {
-                2
-            } else {
-                1
+            // The paper has one photon map, and so has a picture too large for the device to bind two.
+            photon_maps: match config.estimator {
+                Estimator::Sppm if limits.specular && two_maps <= limits.storage_buffer_bytes => 2,
+                _ => 1,
             },
             glossy: limits.glossy,
             aimed: config.emission == EmissionChoice::Aimed,

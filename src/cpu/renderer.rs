@@ -368,6 +368,10 @@ impl Backend for Renderer {
         self.aim.is_some()
     }
 
+    fn photon_maps(&self) -> u32 {
+        self.sizes.photon_maps
+    }
+
     fn device(&self) -> DeviceDescription {
         DeviceDescription {
             name: "CPU".to_owned(),
