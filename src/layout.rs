@@ -35,13 +35,23 @@ pub const RAY_RECORD: u32 = 2;
 
 /// Bit of [`ShadingTriangle::flags`]: the shading normals differ from the geometric one.
 pub const SMOOTH_SHADED: u32 = 1;
-/// Bit of [`ShadingTriangle::flags`]: a dielectric's, and it may lie on a face of another object.
+/// Bit of [`ShadingTriangle::flags`]: a dielectric's, and it may lie on another face.
 pub const TOUCHED: u32 = 2;
-
 /// Bit of [`ShadingTriangle::flags`]: its material depends on the place, by textures or its corners' colours.
 pub const TEXTURED: u32 = 4;
 /// Bit of [`ShadingTriangle::flags`]: parts of it may not be there, see [`Material::alpha_mode`].
 pub const SEE_THROUGH: u32 = 8;
+/// Bit of [`ShadingTriangle::flags`]: no dielectric's, and it lies on a face of another object that looks to the same side or
+/// shines to it.
+pub const COINCIDENT: u32 = 16;
+/// Bit of [`ShadingTriangle::flags`]: no dielectric's, and its back lies on the back of another object's face.
+pub const BACKED: u32 = 32;
+/// From this bit on [`ShadingTriangle::flags`] and [`Instance::flags`] have a dielectric's rank: where several overlap, the
+/// lowest is there.
+pub const RANK: u32 = 16;
+
+/// Bit of [`Instance::flags`]: fronts become backs.
+pub const MIRRORED: u32 = 1;
 
 /// [`Material::flags`]: the back emits as the front does.
 pub const BACK_EMITS: u32 = 1;
@@ -192,8 +202,8 @@ device_structs! {
         pub rows: [[f32; 4]; 3],
         /// Index of its object.
         pub object: u32,
-        /// 1 where fronts become backs.
-        pub mirrored: u32,
+        /// [`MIRRORED`], and the rank from bit [`RANK`] on.
+        pub flags: u32,
         /// Index of its first triangle.
         pub first_triangle: u32,
         /// How many it has.
@@ -222,7 +232,8 @@ device_structs! {
         pub object: u32,
         /// Index of its material.
         pub material: u32,
-        /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED`], [`SEE_THROUGH`].
+        /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED`], [`SEE_THROUGH`], [`COINCIDENT`], [`BACKED`], and the rank from bit
+        /// [`RANK`] on; what instances share has none.
         pub flags: u32,
         /// Index of its light, or [`NO_LIGHT`].
         pub light: u32,

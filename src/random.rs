@@ -160,9 +160,13 @@ impl Random {
     }
 
     /// Decides whether a ray passes the surface of this number that isn't there everywhere.
-    pub fn of_passage(&self, number: u32) -> f64 {
-        let dimension = self.dimension.wrapping_add(number << 16);
-        let [word, ..] = pcg4d([self.path ^ 0x616c_7068, self.iteration, self.seed, dimension]);
+    pub fn number_of(&self, [first, second]: [u32; 2]) -> f64 {
+        let [word, ..] = pcg4d([
+            self.path ^ 0x616c_7068,
+            self.iteration.wrapping_add(second.wrapping_mul(0x85eb_ca6b)),
+            self.seed.wrapping_add(first.wrapping_mul(0x9e37_79b9)),
+            self.dimension,
+        ]);
         f64::from(word >> 8) / f64::from(1 << 24)
     }
 

@@ -13,6 +13,8 @@ mod fixture;
 
 #[path = "stability/capacity.rs"]
 mod capacity;
+#[path = "stability/coincidence.rs"]
+mod coincidence;
 #[path = "stability/geometry.rs"]
 mod geometry;
 #[path = "stability/glass.rs"]
@@ -21,6 +23,8 @@ mod glass;
 mod lights;
 #[path = "stability/model.rs"]
 mod model;
+#[path = "stability/nesting.rs"]
+mod nesting;
 #[path = "stability/places.rs"]
 mod places;
 #[path = "stability/scales.rs"]

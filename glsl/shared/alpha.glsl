@@ -1,30 +1,33 @@
 // Rays past what isn't there. Include after texture.glsl, intersect.glsl and random.glsl.
 
-// As `trace`, by chance through what is there in part: a pure function of the ray's place in its path. A ray goes on a step
-// behind what it has passed: faces in one place are passed as one.
-Hit trace_visible(vec3 origin, vec3 direction, float t_max, PlacedTriangle ignored, bool any, Random random) {
-    if (ALPHA) {
-        any = false;
+// Decides whether a ray finds a face there that isn't there everywhere: a pure function of the ray's place in its path.
+float of_face(Random random, PlacedTriangle at) {
+    return number_of(random, uvec2(at.triangle, at.instance + 1u));
+}
+
+// As `trace`, by chance through what is there in part and, with `culls`, through backs that no camera sees.
+Hit trace_visible(vec3 origin, vec3 direction, float t_max, PlacedTriangle ignored, bool any, bool culls, Random random) {
+    bool passes = ALPHA;
+    if (CULLING) {
+        passes = passes || culls;
     }
-    vec3 from = origin;
-    float passed = 0.0;
-    uint number = 0u;
-    bool goes_on = true;
+    any = any && !passes;
+    Progress progress = AT_ORIGIN;
     Hit hit;
+    bool goes_on = true;
     while (goes_on) {
-        hit = trace(from, direction, t_max - passed, ignored, any);
-        goes_on = ALPHA && hit.triangle != MISS && !loops_cut;
+        hit = trace_from(origin, direction, progress, t_max, ignored, any);
+        goes_on = passes && hit.triangle != MISS && !loops_cut;
         if (goes_on) {
             Surface met = surface_at(hit);
-            goes_on = of_passage(random, number) >= share_there(met);
-            if (goes_on) {
-                from = origin_towards(met, direction);
-                passed = dot(from - origin, direction) / dot(direction, direction);
-                number += 1u;
-                ignored = triangle_of(hit);
+            bool culled = false;
+            if (CULLING) {
+                bool hidden = (material_at(met.material).flags & BACK_HIDDEN) != 0u;
+                culled = culls && hidden && dot(direction, met.geometric_normal) > 0.0;
             }
+            goes_on = culled || of_face(random, triangle_of(hit)) >= share_there(met);
+            progress = past(hit);
         }
     }
-    hit.t += passed;
     return hit;
 }

@@ -1,84 +1,152 @@
-// Dielectrics that lie on other objects. Include after texture.glsl and intersect.glsl.
+// Faces in one place. Rounding decides which of them a ray meets first, and the step off the one takes it past the others: all
+// that are no further apart are met at once. What is opaque is met before glass that lies on it, what shines or looks to the ray
+// before what doesn't. Include after alpha.glsl and media.glsl.
 
-// Where a ray meets matter: a surface, and the index of refraction on its outer side.
-struct Encounter {
-    Surface surface;
-    Material material;
-    Facing facing;
-    float outside;
-    vec3 tint;     // of both sides of a dielectric boundary
-    uint through;  // material that the ray came through, or VACUUM
-    uint beyond;   // and what lies behind a dielectric boundary
+// Cosine of the angle between planes up to which faces can lie on each other over more than a line.
+const float PARALLEL = 0.99;
+
+// What lies in the place where a ray meets matter.
+struct Interface {
+    Surface surface; // that it meets
+    float share;     // chance of that, where something isn't there everywhere
+    bool is_flat;       // a solid dielectric without thickness
+    vec3 tint;       // of the other boundaries of dielectrics there
+    Media through;   // that the ray came through
+    Media beyond;    // behind boundaries of dielectrics
 };
 
-const uint VACUUM = 0xffffffffu;
+// What a face bounds for a ray that meets it in these media.
+uint bounded_medium(Media media, Surface surface, bool front) {
+    uint medium = medium_of(surface);
+    return front ? medium : left_medium(media, medium);
+}
 
-// Rounding decides which of two faces in one place a ray meets first, and the step off the one takes it past the other: where
-// they are no further apart, both are crossed at once. Glass on glass is one boundary between the two; where glass lies on
-// something opaque, that is what the ray meets.
-// medium: the material that the ray is in, as far as its path knows. The other side's tint is that without its textures.
-Encounter encounter(Hit hit, vec3 incoming, uint medium) {
-    Encounter met;
-    met.surface = surface_at(hit);
-    met.outside = 1.0;
-    met.through = medium;
-    met.beyond = medium;
-    bool front = dot(incoming, met.surface.geometric_normal) < 0.0;
-    Material first = material_at(met.surface.material);
-    if (is_dielectric(first) && !is_thin(first)) {
-        met.through = front ? medium : met.surface.material;
-        met.beyond = front ? met.surface.material : VACUUM;
-    }
-    vec3 other_tint = vec3(1.0);
-    bool touched = CONTACT && (met.surface.flags & TOUCHED) != 0u;
-    if (touched) {
-        vec3 n = met.surface.geometric_normal;
-        float step_off = ROUNDINGS * dot(abs(n), met.surface.reach);
-        float size = met.surface.reach.x + met.surface.reach.y + met.surface.reach.z;
-        if (INSTANCED) {
-            size = max(size, 1.0); // of the scene: what lies there may be an instance, see below
+// As the ray, in these media, crosses a boundary of a solid dielectric.
+void cross_boundary(inout Interface place, Media media, Surface surface, bool front) {
+    uint medium = bounded_medium(media, surface, front);
+    if (front) {
+        if (NESTED) {
+            place.through = without(place.through, medium);
         }
-        float probe = ROUNDINGS * size;
-        Hit other_hit = trace(met.surface.position + probe * n, -2.0 * probe * n, 1.0, triangle_of(hit), false);
-        if (other_hit.triangle != MISS) {
-            Surface other = surface_at(other_hit);
-            if (INSTANCED) {
-                // Where an instance puts its corners is uncertain by more than their own rounding.
-                other.reach = max(other.reach, met.surface.reach);
-                step_off = ROUNDINGS * dot(abs(n), other.reach);
+        place.beyond = with(place.beyond, medium);
+    } else {
+        place.through = with(place.through, medium);
+        place.beyond = without(place.beyond, medium);
+    }
+}
+
+bool is_solid(Material material) {
+    return is_dielectric(material) && !is_thin(material);
+}
+
+// Of faces in one place that are no dielectrics', the highest is met.
+uint preference(Surface surface, Material material, vec3 incoming) {
+    bool front = dot(incoming, surface.geometric_normal) < 0.0;
+    bool shines = largest(material.emission) > 0.0 && (front || (material.flags & BACK_EMITS) != 0u);
+    bool hidden = (material.flags & BACK_HIDDEN) != 0u;
+    bool see_through = (surface.flags & SEE_THROUGH) != 0u;
+    uint kind = (shines ? 8u : 0u) | (front ? 4u : 0u) | (hidden ? 0u : 2u) | (see_through ? 1u : 0u);
+    return kind << 28u | min(surface.object + 1u, 0xfffffffu);
+}
+
+// media: those that the ray is in, as far as its path knows.
+Interface interface_at(Hit hit, vec3 incoming, Media media, Random random) {
+    Interface place;
+    place.surface = surface_at(hit);
+    place.share = share_there(place.surface);
+    place.is_flat = false;
+    place.tint = vec3(1.0);
+    place.through = media;
+    place.beyond = media;
+    Surface first = place.surface;
+    Material material = material_at(first.material);
+    vec3 n = first.geometric_normal;
+    bool front = dot(incoming, n) < 0.0;
+    bool opaque = !is_dielectric(material);
+    if (is_solid(material)) {
+        cross_boundary(place, media, first, front);
+    }
+    bool touched = CONTACT && (first.flags & TOUCHED) != 0u;
+    bool coincides = COINCIDENCE && ((first.flags & COINCIDENT) != 0u || (!front && (first.flags & BACKED) != 0u));
+    if (!touched && !coincides) {
+        return place;
+    }
+    uint preferred = opaque ? preference(first, material, incoming) : 0u;
+    uint missing = 0u;         // most preferred of those that aren't there
+    float share_missing = 0.0; // its share
+    uint solid = VACUUM;       // the lowest of the other solids
+    Surface solid_surface = first;
+    vec3 reach = first.reach;
+    // What lies there may be larger and so less certain.
+    float probe = ROUNDINGS * max(first.reach.x + first.reach.y + first.reach.z, 1.0);
+    vec3 from = first.position + probe * n;
+    Progress progress = AT_ORIGIN;
+    bool goes_on = true;
+    while (goes_on) {
+        Hit other_hit = trace_from(from, -2.0 * probe * n, progress, 1.0, triangle_of(hit), false);
+        goes_on = other_hit.triangle != MISS && !loops_cut;
+        if (!goes_on) {
+            break;
+        }
+        progress = past(other_hit);
+        Surface other = surface_at(other_hit);
+        vec3 both = max(other.reach, first.reach);
+        bool apart = abs(dot(other.position - first.position, n)) > ROUNDINGS * dot(abs(n), both);
+        bool same_object = other.object == first.object;
+        bool doubles = same_object && dot(other.geometric_normal, n) < -PARALLEL;
+        if (apart || (same_object && !doubles)) {
+            continue;
+        }
+        Material other_material = material_at(other.material);
+        bool other_front = dot(incoming, other.geometric_normal) < 0.0;
+        uint preference_of_other = preference(other, other_material, incoming);
+        float share = share_there(other);
+        if (of_face(random, triangle_of(other_hit)) >= share) {
+            share_missing = preference_of_other > missing ? share : share_missing;
+            missing = max(missing, preference_of_other);
+            continue;
+        }
+        reach = max(reach, both);
+        if (!is_dielectric(other_material)) {
+            if (!same_object && preference_of_other > preferred) {
+                preferred = preference_of_other;
+                place.surface = other;
+                place.share = share;
+                opaque = true;
             }
-            bool apart = abs(dot(other.position - met.surface.position, n)) > step_off;
-            bool meets_other = !apart && other.object != met.surface.object;
-            if (INSTANCED) {
-                met.surface.reach = meets_other ? other.reach : met.surface.reach;
-            }
-            Material other_material = material_at(other.material);
-            bool is_there = share_there(other) >= 0.5;
-            if (meets_other && !is_dielectric(other_material) && is_there) {
-                met.surface = other;
-            } else if (meets_other && is_dielectric(other_material) && dot(other.geometric_normal, n) < 0.0) {
-                met.outside = other_material.ior;
-                other_tint = other_material.base_color;
-                if (front) {
-                    met.through = other.material;
-                } else {
-                    met.beyond = other.material;
+        } else if (is_solid(other_material) && !opaque) {
+            if (doubles) {
+                place.is_flat = true;
+            } else {
+                cross_boundary(place, media, other, other_front);
+                place.tint *= other_material.base_color;
+                uint bounded = bounded_medium(media, other, other_front);
+                bool lower = bounded < solid;
+                solid = min(solid, bounded);
+                if (lower) {
+                    solid_surface = other;
                 }
             }
         }
     }
-    met.material = material_of(met.surface);
-    met.facing = face(met.surface, incoming);
-    met.tint = met.material.base_color * other_tint;
-    return met;
-}
-
-// What a medium leaves of light over a distance.
-vec3 transmittance(uint medium, float distance) {
-    bool absorbs = ABSORPTION && medium != VACUUM;
-    vec3 absorption = vec3(0.0);
-    if (absorbs) {
-        absorption = TEXEL(Materials, MATERIAL_TEXELS * medium + 4u).rgb;
+    if (missing > preferred) {
+        place.share *= 1.0 - share_missing;
     }
-    return exp(-absorption * distance);
+    if (opaque) {
+        place.is_flat = false;
+        place.tint = vec3(1.0);
+    } else if (place.is_flat) {
+        place.through = media;
+        place.beyond = media;
+    } else if (solid != VACUUM) {
+        // The boundary is that of what is there on either side.
+        uint own = bounded_medium(media, first, front);
+        bool counts = is_solid(material) && (own == place.through.first || own == place.beyond.first);
+        if (!counts) {
+            place.surface = solid_surface;
+            place.tint = material.base_color;
+        }
+    }
+    place.surface.reach = reach;
+    return place;
 }

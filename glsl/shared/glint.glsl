@@ -1,8 +1,7 @@
 // What narrow lobes show of lights without extent, which no direction of theirs meets. Include after alpha.glsl, bsdf.glsl,
 // contact.glsl and light.glsl.
 
-// Of 65,536 numbers of faces that a ray passes, the last.
-const uint FIRST_OF_GLINT = 65520u;
+const uint GLINT = 0x676c696eu; // of numbers that belong to it; no instance has that index
 
 // BSDF · cos of a rough boundary of glass without its tint, as `meet_boundary` draws it: Walter and others, «Microfacet Models for Refraction
 // through Rough Surfaces», EGSR 2007. v and l are unit vectors away from the surface.
@@ -44,8 +43,8 @@ vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outs
 // By a ray to one of the lights or, where visible points are found once, to each. `reflector`: of what isn't glass.
 vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector, vec3 viewer, Random random) {
     // Apart from the path's own numbers: those are the same where there is nothing to ask.
-    vec3 u = vec3(of_passage(random, FIRST_OF_GLINT), of_passage(random, FIRST_OF_GLINT + 1u),
-                  of_passage(random, FIRST_OF_GLINT + 2u));
+    vec3 u = vec3(number_of(random, uvec2(0u, GLINT)), number_of(random, uvec2(1u, GLINT)),
+                  number_of(random, uvec2(2u, GLINT)));
     uint chosen = choose_light(u.x, u.yz).index;
     bool of_one = settings.slots_per_pixel == 1u;
     uint begin = of_one ? chosen : 0u;
@@ -68,7 +67,7 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
             response = glass_response(facing, viewer, l, material, met.outside) * (same_side ? vec3(1.0) : met.tint);
             if (ABSORPTION) {
                 float way = light.kind == DIRECTIONAL_LIGHT ? 1e30 : length(arriving.ray);
-                response *= transmittance(same_side ? met.through : met.beyond, way);
+                response *= transmittance(same_side ? met.through.first : met.beyond.first, way);
             }
         } else if (same_side && nl > 0.0) {
             response = brdf(reflector, facing.shading_normal, viewer, l) * nl;
@@ -76,7 +75,7 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
         response *= arriving.irradiance / (of_one ? light.probability : 1.0);
         bool seen = largest(response) > 0.0;
         if (seen) {
-            seen = trace_visible(origin, arriving.ray, arriving.end, NO_TRIANGLE, true, random).triangle == MISS;
+            seen = trace_visible(origin, arriving.ray, arriving.end, NO_TRIANGLE, true, false, random).triangle == MISS;
         }
         sum += seen ? response : vec3(0.0);
     }

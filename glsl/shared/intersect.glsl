@@ -12,6 +12,34 @@ bool loops_left() {
     return loop_count < settings.loop_limit;
 }
 
+// How far a search has come along a ray: hits count that come later, those at the same distance in the order of instances and
+// triangles. So a ray goes on past a face that it passes, and misses none that lies in the same place.
+struct Progress {
+    float t;
+    PlacedTriangle at;
+};
+
+const Progress AT_ORIGIN = Progress(0.0, PlacedTriangle(MISS, NO_INSTANCE));
+
+Progress past(Hit hit) {
+    return Progress(hit.t, triangle_of(hit));
+}
+
+bool comes_first(PlacedTriangle a, PlacedTriangle b) {
+    return a.instance == b.instance ? a.triangle < b.triangle : a.instance < b.instance;
+}
+
+// Whether a hit at this distance counts, and is nearer than the nearest so far.
+bool is_nearer(float t, PlacedTriangle at, Progress progress, Hit hit) {
+    bool later = t > progress.t;
+    bool nearer = t < hit.t;
+    if (COINCIDENCE) {
+        later = later || (t == progress.t && comes_first(progress.at, at));
+        nearer = nearer || (t == hit.t && hit.triangle != MISS && comes_first(at, triangle_of(hit)));
+    }
+    return later && nearer;
+}
+
 // A ray and coordinates in which it is an axis: `across` and `up` vanish along it.
 struct Ray {
     vec3 origin;
@@ -58,9 +86,9 @@ float side_of(vec2 a, vec2 b) {
 
 // Woop, Benthin and Wald, «Watertight Ray/Triangle Intersection», JCGT 2(1), 2013: no ray passes between triangles that
 // share an edge or a corner. The distance is that of the plane: unlike one interpolated from the corners', it is as right
-// for a ray that starts on the triangle as `offset_origin` counts on. Accepts 0 < t < hit.t.
+// for a ray that starts on the triangle as `offset_origin` counts on. Accepts what `is_nearer` does.
 bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, PlacedTriangle at,
-                          inout Hit hit) {
+                          Progress progress, inout Hit hit) {
     vec2 a = beside(ray, corner0);
     vec2 b = beside(ray, corner1);
     vec2 c = beside(ray, corner2);
@@ -72,7 +100,7 @@ bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, Pla
     float t = dot(n, corner0 - ray.origin) / dot(n, ray.direction);
     float sum = sides.x + sides.y + sides.z;
     // The sum is 0 of a triangle that the ray sees edge on.
-    if (!(t > 0.0 && t < hit.t && sum != 0.0)) {
+    if (!(is_nearer(t, at, progress, hit) && sum != 0.0)) {
         return false;
     }
     float inverse = 1.0 / sum;
@@ -81,14 +109,14 @@ bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, Pla
 }
 
 // Havel and Herout, «Yet faster ray-triangle intersection (using SSE4)», 2010: the test with precomputed planes.
-// The ray is that of the triangle's own space. Accepts 0 < t < hit.t.
-bool intersect_havel(vec3 origin, vec3 direction, PlacedTriangle at, inout Hit hit) {
+// The ray is that of the triangle's own space. Accepts what `is_nearer` does.
+bool intersect_havel(vec3 origin, vec3 direction, PlacedTriangle at, Progress progress, inout Hit hit) {
     HavelTriangle triangle = havel_triangle(at.triangle);
     float det = dot(direction, triangle.n0.xyz);
     float det_t = triangle.n0.w - dot(origin, triangle.n0.xyz);
     float inverse = 1.0 / det;
     float t = det_t * inverse;
-    if (!(t > 0.0 && t < hit.t)) {
+    if (!is_nearer(t, at, progress, hit)) {
         return false;
     }
     vec3 point = origin + t * direction;
@@ -144,9 +172,9 @@ LocalRay in_instance(Ray ray, mat3x4 rows, float widening) {
 }
 
 bool intersect_triangle(Ray ray, LocalRay local, vec3 corner0, vec3 corner1, vec3 corner2, PlacedTriangle at,
-                        inout Hit hit) {
-    return HAVEL ? intersect_havel(local.origin, local.direction, at, hit)
-                 : intersect_watertight(ray, corner0, corner1, corner2, at, hit);
+                        Progress progress, inout Hit hit) {
+    return HAVEL ? intersect_havel(local.origin, local.direction, at, progress, hit)
+                 : intersect_watertight(ray, corner0, corner1, corner2, at, progress, hit);
 }
 
 // Entry distance of the ray into a box, or a value above `limit` where it misses.
@@ -167,6 +195,8 @@ const uint LEAF = 0x80000000u; // of a reference to a leaf's first record, see l
 const uint PLACEMENT_RECORD = 1u; // kinds of a leaf's records, triangles' but not
 const uint RAY_RECORD = 2u;
 
+const float TIE = 16.0 / 16777216.0; // of a distance, that rounding may change
+
 // Rows of the map back.
 mat3x4 inverse_rows(mat3x4 rows) {
     mat3 inverse = inverse(mat3(rows[0].xyz, rows[1].xyz, rows[2].xyz));
@@ -178,7 +208,7 @@ mat3x4 inverse_rows(mat3x4 rows) {
 const mat3x4 UNPLACED = mat3x4(1.0);
 
 // Every triangle, as `trace`: those in render space, then those of each instance.
-Hit trace_all(Ray ray, float limit, PlacedTriangle ignored, bool any_hit) {
+Hit trace_all(Ray ray, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
     Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
     LocalRay local = in_render_space(ray);
     mat3x4 rows = UNPLACED;
@@ -200,7 +230,7 @@ Hit trace_all(Ray ray, float limit, PlacedTriangle ignored, bool any_hit) {
                 corner1 = placed(rows, corner1);
                 corner2 = placed(rows, corner2);
             }
-            over = at != ignored && intersect_triangle(ray, local, corner0, corner1, corner2, at, hit) && any_hit;
+            over = at != ignored && intersect_triangle(ray, local, corner0, corner1, corner2, at, progress, hit) && any_hit;
             at.triangle += 1u;
             left -= 1u;
         }
@@ -221,11 +251,11 @@ Hit trace_all(Ray ray, float limit, PlacedTriangle ignored, bool any_hit) {
     return hit;
 }
 
-// The nearest triangle but `ignored` before t = limit. With any_hit: some triangle before it.
-Hit trace(vec3 origin, vec3 direction, float limit, PlacedTriangle ignored, bool any_hit) {
+// The nearest triangle but `ignored` after `progress` and before t = limit. With any_hit: some triangle there.
+Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
     Ray ray = ray_frame(origin, direction);
     if (BRUTE_FORCE) {
-        return trace_all(ray, limit, ignored, any_hit);
+        return trace_all(ray, progress, limit, ignored, any_hit);
     }
     Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
     LocalRay local = in_render_space(ray);
@@ -262,7 +292,7 @@ Hit trace(vec3 origin, vec3 direction, float limit, PlacedTriangle ignored, bool
                 tests = floatBitsToUint(row3.z) == 0u && (tests || instance != ignored.instance);
             }
             PlacedTriangle at = PlacedTriangle(index, instance);
-            if (tests && intersect_triangle(ray, local, corner0, corner1, corner2, at, hit) && any_hit) {
+            if (tests && intersect_triangle(ray, local, corner0, corner1, corner2, at, progress, hit) && any_hit) {
                 return hit;
             }
             pop = floatBitsToUint(row3.y) == 1u;
@@ -279,8 +309,10 @@ Hit trace(vec3 origin, vec3 direction, float limit, PlacedTriangle ignored, bool
                 }
             }
         } else {
-            float enter_left = enter_box(row0.xyz, row1.xyz, local, hit.t);
-            float enter_right = enter_box(row2.xyz, row3.xyz, local, hit.t);
+            // Rounding puts faces in one place a little behind each other.
+            float reached = COINCIDENCE ? hit.t * (1.0 + TIE) : hit.t;
+            float enter_left = enter_box(row0.xyz, row1.xyz, local, reached);
+            float enter_right = enter_box(row2.xyz, row3.xyz, local, reached);
             uint left = floatBitsToUint(row0.w);
             uint right = floatBitsToUint(row2.w);
             bool left_first = enter_left <= enter_right;
@@ -308,4 +340,9 @@ Hit trace(vec3 origin, vec3 direction, float limit, PlacedTriangle ignored, bool
     } while (!complete && loop_count < limit_of_loops);
     loops_cut = loops_cut || !complete;
     return hit;
+}
+
+// The same from the ray's origin on.
+Hit trace(vec3 origin, vec3 direction, float limit, PlacedTriangle ignored, bool any_hit) {
+    return trace_from(origin, direction, AT_ORIGIN, limit, ignored, any_hit);
 }

@@ -94,10 +94,10 @@ uint congruential(inout uint state) {
     return state;
 }
 
-// Decides whether a ray passes the surface of this number that isn't there everywhere.
-float of_passage(Random random, uint number) {
-    return unit_floats(pcg4d(uvec4(random.path ^ 0x616c7068u, random.iteration, random.seed,
-                                   random.dimension + (number << 16u)))).x;
+// A number that belongs to something at the path's present place: whenever it is asked for there, it is the same.
+float number_of(Random random, uvec2 thing) {
+    return unit_floats(pcg4d(uvec4(random.path ^ 0x616c7068u, random.iteration + thing.y * 0x85ebca6bu,
+                                   random.seed + thing.x * 0x9e3779b9u, random.dimension))).x;
 }
 
 // The next four numbers, uniform in [0, 1).

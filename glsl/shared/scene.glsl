@@ -17,6 +17,8 @@ layout(constant_id = 20) const bool INSTANCED = false;
 layout(constant_id = 21) const bool CLEARCOAT = false;
 layout(constant_id = 22) const bool SPECULAR_GLASS = false;
 layout(constant_id = 23) const bool CULLING = false;
+layout(constant_id = 26) const bool COINCIDENCE = false;
+layout(constant_id = 27) const bool NESTED = false;
 
 const uint MISS = 0xffffffffu;
 
@@ -26,7 +28,13 @@ const uint NO_INSTANCE = 0xffffffffu;
 
 // Flags of a triangle.
 const uint SMOOTH_SHADED = 1u; // the shading normals differ from the geometric one
-const uint TOUCHED = 2u;       // a dielectric's, and it may lie on a face of another object
+const uint TOUCHED = 2u;       // a dielectric's, and it may lie on another face
+const uint COINCIDENT = 16u;   // no dielectric's, and it lies on a face of another object that looks or shines to the same side
+const uint BACKED = 32u;       // no dielectric's, and its back lies on the back of another object's face
+const uint RANK = 16u;         // from this bit on: of dielectrics that overlap, the lowest is there
+const uint RANK_BELOW = 0xffffu;
+
+const uint MIRRORED = 1u; // of an instance's flags, which have a rank as well
 
 const uint BACK_EMITS = 1u;
 const uint BACK_HIDDEN = 2u;
@@ -50,7 +58,7 @@ struct ShadingTriangle {
     vec4 p2;
     uint object;
     uint material;
-    uint flags; // SMOOTH_SHADED, TOUCHED
+    uint flags; // SMOOTH_SHADED, TOUCHED, COINCIDENT, BACKED, and a rank
     uint light; // NO_LIGHT where it doesn't emit
 };
 
@@ -58,7 +66,7 @@ struct ShadingTriangle {
 struct Instance {
     mat3x4 rows;         // of the map to render space
     uint object;
-    uint mirrored;       // 1 where fronts become backs
+    uint flags; // MIRRORED, and a rank
     uint first_triangle;
     uint triangle_count;
 };
@@ -131,6 +139,11 @@ Instance instance_at(uint i) {
     uvec4 rest = TEXEL_BITS(Instances, 4u * i + 3u);
     return Instance(mat3x4(TEXEL(Instances, 4u * i), TEXEL(Instances, 4u * i + 1u), TEXEL(Instances, 4u * i + 2u)), rest.x,
                     rest.y, rest.z, rest.w);
+}
+
+// Whether fronts become backs.
+bool is_mirrored(Instance instance) {
+    return (instance.flags & MIRRORED) != 0u;
 }
 
 // Where a map puts a point: the same for all triangles that share a corner, and `Placement::point` in src/scene.
@@ -262,7 +275,7 @@ mat3 normal_rows(Instance instance) {
     x *= scale;
     y *= scale;
     z *= scale;
-    float side = instance.mirrored != 0u ? -1.0 : 1.0;
+    float side = is_mirrored(instance) ? -1.0 : 1.0;
     return side * mat3(cross(y, z), cross(z, x), cross(x, y));
 }
 
@@ -307,7 +320,8 @@ Surface surface_at(PlacedTriangle at, vec2 uv) {
         // So much the corners are uncertain by against those of other objects in the same place.
         surface.reach = vec3(dot(abs(instance.rows[0]), vec4(1.0)), dot(abs(instance.rows[1]), vec4(1.0)),
                              dot(abs(instance.rows[2]), vec4(1.0)));
-        surface.geometric_normal *= instance.mirrored != 0u ? -1.0 : 1.0;
+        surface.geometric_normal *= is_mirrored(instance) ? -1.0 : 1.0;
+        triangle.flags |= instance.flags & ~RANK_BELOW;
     }
     surface.shading_normal = interpolated_normal(triangle, uv, surface.geometric_normal, is_placed, rows);
     surface.coat_normal = surface.shading_normal;

@@ -67,7 +67,7 @@ Place place_at(PlacedTriangle at, vec2 uv) {
             vec4 direction = vec4(tangent, 0.0);
             tangent = normalize(vec3(dot(instance.rows[0], direction), dot(instance.rows[1], direction),
                                      dot(instance.rows[2], direction)));
-            corner.bitangent *= instance.mirrored != 0u ? -1.0 : 1.0;
+            corner.bitangent *= is_mirrored(instance) ? -1.0 : 1.0;
         }
         place.tangent += weight * vec4(tangent * abs(corner.bitangent), corner.bitangent);
     }

@@ -16,7 +16,9 @@ layout(local_size_x = 64) in;
 #include "alpha.glsl"
 #include "bsdf.glsl"
 #include "dispersion.glsl"
+#include "media.glsl"
 #include "contact.glsl"
+#include "encounter.glsl"
 #include "environment.glsl"
 #include "light.glsl"
 #include "glint.glsl"
@@ -47,7 +49,7 @@ struct Branch {
     float way; // from the camera so far
     uint depth;
     PlacedTriangle ignored;
-    uint medium;          // material that it is in, or VACUUM
+    Media media;          // that it is in
     float wavelength;     // nm; 0: of all
     bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
     bool emission_seen;   // what the next surface emits
@@ -67,21 +69,21 @@ struct Glimpse {
     bool dark; // nothing is there that scatters light
 };
 
-Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, uint medium, Random random) {
-    Hit hit = trace_visible(origin, direction, 1e30, ignored, false, random);
+Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, Media media, Random random) {
+    Hit hit = trace_visible(origin, direction, 1e30, ignored, false, false, random);
     if (loops_cut) {
         return Glimpse(vec3(0.0), true);
     }
     if (hit.triangle == MISS) {
         return Glimpse(radiance_from_afar(direction), true);
     }
-    Encounter met = encounter(hit, direction, medium);
+    Encounter met = encounter(hit, direction, media, random);
     bool dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
     vec3 emission = emits(met.material, met.facing.front)
                         ? emitted_radiance(met.material, -dot(direction, met.facing.geometric_normal))
                         : vec3(0.0);
     if (ABSORPTION) {
-        emission *= transmittance(met.through, hit.t);
+        emission *= transmittance(met.through.first, hit.t);
     }
     return Glimpse(emission, dark);
 }
@@ -133,7 +135,7 @@ void main() {
     branch.way = 0.0;
     branch.depth = 0u;
     branch.ignored = NO_TRIANGLE;
-    branch.medium = VACUUM;
+    branch.media = IN_VACUUM;
     branch.wavelength = 0.0;
     branch.reflection_seen = false;
     branch.emission_seen = false;
@@ -146,25 +148,24 @@ void main() {
         loop_count += 1u;
         bool ended = true;
         visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
-        Hit hit = trace_visible(branch.origin, branch.direction, 1e30, branch.ignored, false, random);
+        Hit hit = trace_visible(branch.origin, branch.direction, 1e30, branch.ignored, false, branch.depth == 0u, random);
         if (loops_cut) {
             cut = true;
         } else if (hit.triangle != MISS) {
-            Encounter met = encounter(hit, branch.direction, branch.medium);
+            Encounter met = encounter(hit, branch.direction, branch.media, random);
             Surface surface = met.surface;
             Material material = met.material;
             Facing facing = met.facing;
             branch.way += hit.t;
-            bool culled = CULLING && branch.depth == 0u && !facing.front && (material.flags & BACK_HIDDEN) != 0u;
-            if (culled) {
-                // What lies behind isn't there by the same chance again.
-                next4(random);
+            if (ABSORPTION) {
+                branch.throughput *= transmittance(met.through.first, hit.t);
+            }
+            if (met.hidden) {
+                branch.throughput *= met.tint;
+                branch.media = met.beyond;
                 branch.origin = origin_towards(surface, branch.direction);
                 branch.ignored = surface.triangle;
                 continue;
-            }
-            if (ABSORPTION) {
-                branch.throughput *= transmittance(met.through, hit.t);
             }
             if (emits(material, facing.front)) {
                 vec3 emission = emitted_radiance(material, -dot(branch.direction, facing.geometric_normal));
@@ -240,7 +241,7 @@ void main() {
                         Branch other = branch;
                         other.direction = boundary.reflected;
                         other.throughput *= boundary.reflectance * boundary.reflected_weight;
-                        other.medium = met.through;
+                        other.media = met.through;
                         other.emitted = vec3(0.0);
                         other.origin = origin_towards(surface, other.direction);
                         pending[pending_count] = other;
@@ -263,7 +264,10 @@ void main() {
                     }
                     branch.direction = reflect_now ? boundary.reflected : boundary.refracted;
                     branch.throughput *= reflect_now ? boundary.reflected_weight : transmission;
-                    branch.medium = reflect_now ? met.through : met.beyond;
+                    branch.media = met.beyond;
+                    if (reflect_now) {
+                        branch.media = met.through;
+                    }
                     ended = largest(branch.throughput) <= 0.0;
                 }
                 branch.origin = origin_towards(surface, branch.direction);

@@ -70,9 +70,9 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     bool inside = false;
     Side entered;
     PlacedTriangle ignored = NO_TRIANGLE;
-    float done = 0.0;
+    Progress progress = AT_ORIGIN;
     for (uint i = 0u; i < MOST_CROSSINGS; i++) {
-        Hit hit = trace(origin + done * along, (1.0 - done) * along, 1.0, ignored, false);
+        Hit hit = trace_from(origin, along, progress, 1.0, NO_TRIANGLE, false);
         if (hit.triangle == MISS) {
             break;
         }
@@ -85,29 +85,29 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
             inside = !inside;
             entered = side_of(surface, along);
         }
-        done += hit.t * (1.0 - done);
+        progress = past(hit);
         ignored = triangle_of(hit);
     }
     // An open sheet has been crossed, but encloses nothing.
     if (inside && leaves(origin + along, along, ignored, entered) && leaves(origin + along, n, ignored, entered)) {
         return false;
     }
-    // Then down: it may bend, but it must be there, under glass that lies on it too.
-    Hit below = trace(origin + along, -radius * n, 1.0, NO_TRIANGLE, false);
-    if (CONTACT && below.triangle != MISS) {
-        ShadingTriangle met = shading_triangle(below.triangle);
-        if (is_placed(below.instance)) {
-            met.object = instance_at(below.instance).object;
-        }
-        if (met.object != object && is_dielectric(material_at(met.material))) {
-            below = trace(origin + along, -radius * n, 1.0, triangle_of(below), false);
+    // Then down: it may bend, but it must be there, under glass that lies on it and other faces in its place too.
+    progress = AT_ORIGIN;
+    bool is_there = false;
+    bool goes_on = true;
+    for (uint i = 0u; i < MOST_CROSSINGS && goes_on; i++) {
+        Hit below = trace_from(origin + along, -radius * n, progress, 1.0, NO_TRIANGLE, false);
+        goes_on = below.triangle != MISS && !loops_cut;
+        if (goes_on) {
+            Surface there = surface_at(below);
+            is_there = there.object == object && share_there(there) > 0.0;
+            bool lies_on = COINCIDENCE && (there.flags & (COINCIDENT | BACKED)) != 0u;
+            goes_on = !is_there && (lies_on || (CONTACT && is_dielectric(material_at(there.material))));
+            progress = past(below);
         }
     }
-    if (below.triangle == MISS) {
-        return false;
-    }
-    Surface there = surface_at(below);
-    return there.object == object && share_there(there) > 0.0;
+    return is_there;
 }
 
 // Whether a ray meets something, past glass, that may scatter light or mirror it.

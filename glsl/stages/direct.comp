@@ -17,6 +17,8 @@ layout(local_size_x = 64) in;
 #include "texture.glsl"
 #include "alpha.glsl"
 #include "bsdf.glsl"
+#include "media.glsl"
+#include "contact.glsl"
 #include "environment.glsl"
 #include "light.glsl"
 #include "object_grid.glsl"
@@ -164,7 +166,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool be
     bool any = !by_bsdf;
     bool goes_on = true;
     while (goes_on) {
-        hit = trace_visible(from, ray, question.end - passed, question.ignored, any, random);
+        hit = trace_visible(from, ray, question.end - passed, question.ignored, any, false, random);
         goes_on = ASKS_BEHIND_GLASS && asks && hit.triangle != MISS && !loops_cut && crossings < MOST_CROSSINGS;
         if (goes_on) {
             ShadingTriangle triangle = shading_triangle(hit.triangle);
@@ -209,7 +211,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool be
             if (missed) {
                 return vec3(0.0);
             }
-            emitter = surface_at(hit);
+            emitter = interface_at(hit, ray, IN_VACUUM, random).surface;
         }
         if (emitter.light == NO_LIGHT) {
             return vec3(0.0);

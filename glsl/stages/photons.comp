@@ -18,7 +18,9 @@ layout(local_size_x = 64) in;
 #include "alpha.glsl"
 #include "bsdf.glsl"
 #include "dispersion.glsl"
+#include "media.glsl"
 #include "contact.glsl"
+#include "encounter.glsl"
 #include "environment.glsl"
 #include "light.glsl"
 #include "emission.glsl"
@@ -51,7 +53,7 @@ struct Path {
     vec3 flux;
     uint depth;
     PlacedTriangle ignored;
-    uint medium; // material that it is in, or VACUUM
+    Media media; // that it is in
     float wavelength; // nm; 0: of all
     bool seen_directly; // no bounce since the light: direct light, which `direct` samples
     bool caustic;       // mirrors and glass alone since the light
@@ -66,7 +68,7 @@ Path start(inout Random random) {
     path.flux = emission.flux;
     path.depth = 0u;
     path.ignored = emission.ignored;
-    path.medium = VACUUM;
+    path.media = IN_VACUUM;
     path.wavelength = 0.0;
     path.seen_directly = true;
     path.caustic = true;
@@ -139,7 +141,7 @@ void main() {
             }
         }
         rays += 1u;
-        Hit hit = trace_visible(path.origin, path.direction, 1e30, path.ignored, false, random);
+        Hit hit = trace_visible(path.origin, path.direction, 1e30, path.ignored, false, false, random);
         if (loops_cut) {
             break;
         }
@@ -148,12 +150,12 @@ void main() {
             continue;
         }
         vec3 incoming = path.direction;
-        Encounter met = encounter(hit, incoming, path.medium);
+        Encounter met = encounter(hit, incoming, path.media, random);
         Surface surface = met.surface;
         Material material = met.material;
         Facing facing = met.facing;
         if (ABSORPTION) {
-            path.flux *= transmittance(met.through, hit.t);
+            path.flux *= transmittance(met.through.first, hit.t);
         }
         if (PUNCTUAL_LIGHTS) {
             // A range is how far the light itself reaches, not what it lights.
@@ -162,6 +164,13 @@ void main() {
         }
         if (largest(path.flux) <= 0.0) {
             alive = false;
+            continue;
+        }
+        if (met.hidden) {
+            path.flux *= met.tint;
+            path.media = met.beyond;
+            path.origin = origin_towards(surface, path.direction);
+            path.ignored = surface.triangle;
             continue;
         }
         vec4 u = next4(random);
@@ -186,7 +195,7 @@ void main() {
                         Photon photon;
                         photon.position_object = vec4(surface.position, uintBitsToFloat(surface.object | map << 31u));
                         // What is there in part is seen in part as well as met in part.
-                        photon.flux_direction = vec4(landing / share_there(surface),
+                        photon.flux_direction = vec4(landing / met.share,
                                                      uintBitsToFloat(encode_direction(incoming)));
                         lane_photons[stored * settings.photon_lanes + lane] = photon;
                     }
@@ -234,7 +243,10 @@ void main() {
             vec3 weight = reflected ? boundary.reflected_weight : met.tint * boundary.refracted_weight;
             alive = survives(path.flux, path.flux * (layer * weight), u.z);
             path.direction = reflected ? boundary.reflected : boundary.refracted;
-            path.medium = reflected ? met.through : met.beyond;
+            path.media = met.beyond;
+            if (reflected) {
+                path.media = met.through;
+            }
         }
         path.origin = origin_towards(surface, path.direction);
         path.ignored = surface.triangle;

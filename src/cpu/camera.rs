@@ -7,21 +7,22 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::boundary::Boundary;
-use super::contact::{Encounter, choose_part, is_mixed, transmittance};
+use super::contact::{Encounter, choose_part, is_mixed};
 use super::dispersion::disperse;
 use super::environment::Environment;
 use super::glint::glint;
 use super::gloss::Reflector;
 use super::intersect::{PlacedTriangle, Ray};
 use super::light::{emits, emitted_radiance};
+use super::media::{Media, transmittance};
 use super::sampling::{disc_point, encode_direction};
 use super::surface::{Facing, GLOSSY, MATTE, MIRROR, Surface};
-use super::texture::nearest_visible;
+use super::texture::{nearest_seen, nearest_visible};
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{BACK_HIDDEN, FOLLOWED_ALPHA, Gloss, NO_OBJECT, VisiblePoint};
+use crate::layout::{FOLLOWED_ALPHA, Gloss, NO_OBJECT, VisiblePoint};
 use crate::random::{CameraTurn, PathKind, Random};
 
 /// What is left of a path that splits.
@@ -34,8 +35,8 @@ struct Branch {
     way: f64,
     depth: u32,
     ignored: Option<PlacedTriangle>,
-    /// Material that it is in.
-    medium: Option<u32>,
+    /// That it is in.
+    media: Media,
     /// Of its light, nm.
     wavelength: Option<f64>,
     /// What a boundary that didn't split the path reflects of the lights' own radiance has been seen.
@@ -49,7 +50,7 @@ fn glimpse(
     inputs: &Inputs<'_>,
     ray: Ray,
     ignored: Option<PlacedTriangle>,
-    medium: Option<u32>,
+    media: Media,
     random: &Random,
 ) -> (DVec3, bool) {
     let Some(hit) = nearest_visible(inputs, ray, FAR, ignored, random) else {
@@ -58,7 +59,7 @@ fn glimpse(
             true,
         );
     };
-    let met = Encounter::new(inputs, hit, ray.direction, medium);
+    let met = Encounter::new(inputs, hit, ray.direction, media, random);
     let material = met.surface.material;
     let dark = material.surface == MATTE && rgb(material.base_color).max_element() == 0.0;
     if emits(&material, met.facing.front) {
@@ -214,7 +215,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
         way: 0.0,
         depth: 0,
         ignored: None,
-        medium: None,
+        media: Media::VACUUM,
         wavelength: None,
         reflection_seen: false,
         emission_seen: false,
@@ -222,7 +223,8 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
     let mut used = 0;
     while let Some(mut branch) = pending.pop() {
         let slot = loop {
-            let Some(hit) = nearest_visible(inputs, branch.ray, FAR, branch.ignored, &random) else {
+            let culls = branch.depth == 0;
+            let Some(hit) = nearest_seen(inputs, branch.ray, FAR, branch.ignored, culls, &random) else {
                 if !branch.emission_seen {
                     let sky = Environment::of(&inputs.scene.environment).at(branch.ray.direction);
                     branch.emitted += branch.throughput * sky.radiance;
@@ -230,17 +232,17 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                 break nothing_seen(branch.emitted);
             };
             let incoming = branch.ray.direction;
-            let met = Encounter::new(inputs, hit, incoming, branch.medium);
+            let met = Encounter::new(inputs, hit, incoming, branch.media, &random);
             let (surface, mut facing) = (met.surface, met.facing);
             branch.way += hit.t;
-            if branch.depth == 0 && !facing.front && surface.material.flags & BACK_HIDDEN != 0 {
-                // What lies behind isn't there by the same chance again.
-                random.next4();
+            branch.throughput *= transmittance(inputs, met.through, hit.t);
+            if met.hidden {
+                branch.throughput *= met.tint;
+                branch.media = met.beyond;
                 branch.ray.origin = surface.origin_towards(incoming);
                 branch.ignored = Some(surface.triangle);
                 continue;
             }
-            branch.throughput *= transmittance(inputs, met.through, hit.t);
             let base_color = rgb(surface.material.base_color);
             if emits(&surface.material, facing.front) {
                 let emission = emitted_radiance(&surface.material, -incoming.dot(facing.geometric_normal));
@@ -334,12 +336,12 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                                 direction: boundary.reflected,
                             },
                             throughput: branch.throughput * boundary.reflectance * boundary.reflected_weight,
-                            medium: met.through,
+                            media: met.through,
                             emitted: DVec3::ZERO,
                             ..branch
                         });
                         branch.throughput *= (1.0 - boundary.reflectance) * transmission;
-                        branch.medium = met.beyond;
+                        branch.media = met.beyond;
                         refracted
                     }
                     Some(refracted) => {
@@ -361,17 +363,17 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                         }
                         if refracts {
                             branch.throughput *= transmission;
-                            branch.medium = met.beyond;
+                            branch.media = met.beyond;
                             refracted
                         } else {
                             branch.throughput *= boundary.reflected_weight;
-                            branch.medium = met.through;
+                            branch.media = met.through;
                             boundary.reflected
                         }
                     }
                     None => {
                         branch.throughput *= boundary.reflected_weight;
-                        branch.medium = met.through;
+                        branch.media = met.through;
                         boundary.reflected
                     }
                 }

@@ -1,113 +1,221 @@
-//! Dielectrics that lie on other objects: the counterpart of `glsl/shared/contact.glsl`.
+//! Faces in one place: the counterpart of `glsl/shared/contact.glsl`.
 
 use glam::DVec3;
 
 use super::Inputs;
-use super::intersect::{Hit, Ray, nearest_hit};
+use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
+use super::media::{Media, bounded_medium, ior_of_medium};
 use super::surface::{DIELECTRIC, Facing, GLOSSY, ROUNDINGS, Surface, surface_of};
-use super::texture::{apply_textures, share_there};
+use super::texture::{apply_textures, is_face_there, share_there};
 use super::vector::rgb;
-use crate::layout::{Material, TOUCHED};
+use crate::layout::{BACK_EMITS, BACK_HIDDEN, BACKED, COINCIDENT, Material, SEE_THROUGH, TOUCHED};
+use crate::random::Random;
+
+/// Cosine of the angle between planes up to which faces can lie on each other over more than a line.
+const PARALLEL: f64 = 0.99;
+
+/// What lies in the place where a ray meets matter.
+pub(super) struct Interface {
+    /// That it meets, without its textures.
+    pub surface: Surface,
+    /// Chance of that, where something isn't there everywhere.
+    share: f64,
+    /// A solid dielectric without thickness.
+    is_flat: bool,
+    /// Of the other boundaries of dielectrics there.
+    tint: DVec3,
+    /// That the ray came through.
+    through: Media,
+    /// Behind boundaries of dielectrics.
+    beyond: Media,
+}
+
+fn is_solid(material: &Material) -> bool {
+    material.surface == DIELECTRIC && material.thin == 0
+}
+
+fn is_front(surface: &Surface, incoming: DVec3) -> bool {
+    incoming.dot(surface.geometric_normal) < 0.0
+}
+
+/// Of faces in one place that are no dielectrics', the highest is met.
+fn preference(surface: &Surface, incoming: DVec3) -> (bool, bool, bool, bool, u32) {
+    let front = is_front(surface, incoming);
+    let material = &surface.material;
+    let shines = rgb(material.emission).max_element() > 0.0 && (front || material.flags & BACK_EMITS != 0);
+    let hidden = material.flags & BACK_HIDDEN != 0;
+    (shines, front, !hidden, surface.flags & SEE_THROUGH != 0, surface.object)
+}
+
+impl Interface {
+    /// `media`: those that the ray is in, as far as its path knows.
+    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, random: &Random) -> Self {
+        let first = surface_of(inputs.scene, hit);
+        let mut place = Self {
+            surface: first,
+            share: share_there(inputs.scene, &first),
+            is_flat: false,
+            tint: DVec3::ONE,
+            through: media,
+            beyond: media,
+        };
+        let nested = inputs.scene.features.nested;
+        if is_solid(&first.material) {
+            place.cross(media, &first, incoming, nested);
+        }
+        let backed = first.flags & BACKED != 0 && !is_front(&first, incoming);
+        if first.flags & (TOUCHED | COINCIDENT) == 0 && !backed {
+            return place;
+        }
+        let is_opaque = first.material.surface != DIELECTRIC;
+        let mut preferred = is_opaque.then(|| preference(&first, incoming));
+        let mut missing = None;
+        let bounded = |surface: &Surface| bounded_medium(media, surface, is_front(surface, incoming), nested);
+        let mut solid: Option<Surface> = None;
+        let mut reach = first.reach;
+        for (other, at) in others(inputs, hit, &first) {
+            let both = other.reach.max(first.reach);
+            let n = first.geometric_normal;
+            let apart = (other.position - first.position).dot(n).abs() > ROUNDINGS * n.abs().dot(both);
+            let same_object = other.object == first.object;
+            let doubles = same_object && other.geometric_normal.dot(n) < -PARALLEL;
+            if apart || (same_object && !doubles) {
+                continue;
+            }
+            let preference = preference(&other, incoming);
+            let share = share_there(inputs.scene, &other);
+            if !is_face_there(inputs.scene, &other, at, random) {
+                // Shares aren't negative: their bits have an order.
+                missing = missing.max(Some((preference, share.to_bits())));
+                continue;
+            }
+            reach = reach.max(both);
+            if other.material.surface != DIELECTRIC {
+                if !same_object && Some(preference) > preferred {
+                    preferred = Some(preference);
+                    place.surface = other;
+                    place.share = share;
+                }
+            } else if is_solid(&other.material) && preferred.is_none() {
+                if doubles {
+                    place.is_flat = true;
+                } else {
+                    place.cross(media, &other, incoming, nested);
+                    place.tint *= rgb(other.material.base_color);
+                    if solid.is_none_or(|solid| bounded(&other) < bounded(&solid)) {
+                        solid = Some(other);
+                    }
+                }
+            }
+        }
+        if let Some((missing, share)) = missing
+            && Some(missing) > preferred
+        {
+            place.share *= 1.0 - f64::from_bits(share);
+        }
+        if preferred.is_some() {
+            place.is_flat = false;
+            place.tint = DVec3::ONE;
+        } else if place.is_flat {
+            place.through = media;
+            place.beyond = media;
+        } else if let Some(solid) = solid {
+            // The boundary is that of what is there on either side.
+            let own = bounded(&first);
+            let counts = is_solid(&first.material) && [place.through.first(), place.beyond.first()].contains(&own);
+            if !counts {
+                place.surface = solid;
+                place.tint = rgb(first.material.base_color);
+            }
+        }
+        place.surface.reach = reach;
+        place
+    }
+
+    /// As the ray, in these media, crosses a boundary of a solid dielectric.
+    fn cross(&mut self, media: Media, surface: &Surface, incoming: DVec3, nested: bool) {
+        let front = is_front(surface, incoming);
+        let medium = bounded_medium(media, surface, front, nested);
+        if front {
+            if nested {
+                self.through = self.through.without(medium, nested);
+            }
+            self.beyond = self.beyond.with(medium, nested);
+        } else {
+            self.through = self.through.with(medium, nested);
+            self.beyond = self.beyond.without(medium, nested);
+        }
+    }
+}
+
+/// Faces about a hit.
+fn others<'a>(
+    inputs: &'a Inputs<'_>,
+    hit: Hit,
+    first: &Surface,
+) -> impl Iterator<Item = (Surface, PlacedTriangle)> + use<'a> {
+    // What lies there may be larger and so less certain.
+    let probe = ROUNDINGS * first.reach.element_sum().max(1.0) * first.geometric_normal;
+    let ray = Ray {
+        origin: first.position + probe,
+        direction: -2.0 * probe,
+    };
+    let next = move |progress: &Progress| nearest_hit_from(inputs, ray, *progress, 1.0, Some(hit.at));
+    let hits = std::iter::successors(next(&Progress::AT_ORIGIN), move |hit| next(&Progress::past(*hit)));
+    hits.map(|hit| (surface_of(inputs.scene, hit), hit.at))
+}
 
 /// Where a ray meets matter.
 pub(super) struct Encounter {
     pub surface: Surface,
     pub facing: Facing,
+    /// Chance that it is met there, where something isn't there everywhere.
+    pub share: f64,
+    /// A boundary inside of something of lower rank: nothing but its tint counts.
+    pub hidden: bool,
     /// Index of refraction outside of a dielectric.
     pub outside: f64,
-    /// What light keeps that passes a dielectric boundary, of both sides.
+    /// What light keeps that passes the boundaries of dielectrics there.
     pub tint: DVec3,
-    /// Material that the ray came through.
-    pub through: Option<u32>,
-    /// And what lies behind a dielectric boundary.
-    pub beyond: Option<u32>,
+    /// That the ray came through.
+    pub through: Media,
+    /// Behind boundaries of dielectrics.
+    pub beyond: Media,
 }
 
 impl Encounter {
-    /// Which of two faces in one place comes first is chance: both are crossed at once. Glass on glass is one boundary between
-    /// the two; on something opaque that is what the ray meets. `medium`: the material that the ray is in, as far as its
-    /// path knows.
-    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, medium: Option<u32>) -> Self {
-        let at = |hit: Hit| surface_of(inputs.scene, hit);
-        let textured = |mut surface: Surface| {
-            apply_textures(inputs.scene, &mut surface);
-            surface
-        };
-        let mut surface = textured(at(hit));
-        let own = Some(surface.material_index);
-        let solid = surface.material.surface == DIELECTRIC && surface.material.thin == 0;
-        let (through, beyond) = match (solid, Facing::new(&surface, incoming).front) {
-            (false, _) => (medium, medium),
-            (true, true) => (medium, own),
-            (true, false) => (own, None),
-        };
-        let alone = |surface: Surface| Self {
-            facing: Facing::new(&surface, incoming),
-            outside: 1.0,
-            tint: rgb(surface.material.base_color),
+    /// `media`: those that the ray is in, as far as its path knows.
+    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, random: &Random) -> Self {
+        let Interface {
+            mut surface,
+            share,
+            is_flat,
+            tint,
+            through,
+            beyond,
+        } = Interface::new(inputs, hit, incoming, media, random);
+        apply_textures(inputs.scene, &mut surface);
+        if is_flat {
+            surface.material.thin = 1;
+        }
+        let facing = Facing::new(&surface, incoming);
+        let nests = inputs.scene.features.nested && is_solid(&surface.material);
+        let outer = if facing.front { through } else { beyond };
+        Self {
+            facing,
+            share,
+            hidden: nests && through.first() == beyond.first(),
+            outside: if nests {
+                ior_of_medium(inputs, outer.first())
+            } else {
+                1.0
+            },
+            tint: tint * rgb(surface.material.base_color),
             through,
             beyond,
             surface,
-        };
-        if surface.flags & TOUCHED == 0 {
-            return alone(surface);
-        }
-        let n = surface.geometric_normal;
-        let instanced = inputs.scene.features.instanced;
-        // Where an instance puts its corners is uncertain by more than their own rounding, but by no more than of the scene.
-        let size = surface.reach.element_sum().max(if instanced { 1.0 } else { 0.0 });
-        let probe = ROUNDINGS * size * n;
-        let through = Ray {
-            origin: surface.position + probe,
-            direction: -2.0 * probe,
-        };
-        let touches = |other: &Surface| {
-            let step = ROUNDINGS * n.abs().dot(if instanced { other.reach } else { surface.reach });
-            other.object != surface.object && (other.position - surface.position).dot(n).abs() <= step
-        };
-        let other = nearest_hit(inputs, through, 1.0, Some(hit.at)).map(|hit| {
-            let mut other = at(hit);
-            if instanced {
-                other.reach = other.reach.max(surface.reach);
-            }
-            other
-        });
-        let other = other.filter(touches);
-        if let Some(other) = &other
-            && instanced
-        {
-            surface.reach = other.reach;
-        }
-        match other {
-            Some(other) if other.material.surface != DIELECTRIC => {
-                // What isn't there everywhere is all there or not at all here.
-                if share_there(inputs.scene, &other) >= 0.5 {
-                    alone(textured(other))
-                } else {
-                    alone(surface)
-                }
-            }
-            Some(other) if other.geometric_normal.dot(n) < 0.0 => {
-                let met = alone(surface);
-                let other_side = Some(other.material_index);
-                Self {
-                    outside: f64::from(other.material.ior),
-                    tint: met.tint * rgb(other.material.base_color),
-                    through: if met.facing.front { other_side } else { met.through },
-                    beyond: if met.facing.front { met.beyond } else { other_side },
-                    ..met
-                }
-            }
-            _ => alone(surface),
         }
     }
-}
-
-/// What a medium leaves of light over a distance.
-pub(super) fn transmittance(inputs: &Inputs<'_>, medium: Option<u32>, distance: f64) -> DVec3 {
-    medium.map_or(DVec3::ONE, |material| {
-        (-rgb(inputs.scene.materials[material as usize].absorption) * distance).exp()
-    })
 }
 
 /// What part of a surface passes light; 1 for what is no dielectric at all.

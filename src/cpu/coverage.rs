@@ -3,13 +3,13 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::intersect::{Ray, nearest_hit};
+use super::intersect::{Progress, Ray, nearest_hit, nearest_hit_from};
 use super::sampling::{basis, cosine_direction, decode_direction, disc_point};
 use super::surface::{DIELECTRIC, MATTE, Surface, offset_origin, reach_of, surface_of};
 use super::texture::share_there;
 use super::vector::{word, xyz};
 use super::{FAR, Inputs};
-use crate::layout::{Coverage, Gathered, NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint};
+use crate::layout::{BACKED, COINCIDENT, Coverage, Gathered, NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint};
 use crate::random::Random;
 
 /// What an iteration counts for, whatever its points.
@@ -61,7 +61,7 @@ pub fn coverage(
             let radius = f64::from(radius2).sqrt();
             let covered = (0..points).filter(|&number| {
                 let [u, v, ..] = random.sample_of(number, points).next4();
-                can_have_photons(inputs, point, radius, u, v)
+                can_have_photons(inputs, point, radius, [u, v])
             });
             coverage.covered += covered.count() as u32 * (WHOLE / points);
             coverage.asked += WHOLE;
@@ -84,19 +84,19 @@ impl Side {
     }
 }
 
-fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f64, v: f64) -> bool {
+fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, [u, v]: [f64; 2]) -> bool {
     let object = word(point.position_object);
     let n = decode_direction(word(point.weight_normal));
     let origin = offset_origin(xyz(point.position_object), n, reach_of(inputs.scene, object));
     let along = basis(n) * (radius * disc_point(u, v)).extend(0.0);
     // Along the surface, into other objects and out of them again.
-    let (mut entered, mut ignored, mut done) = (None, None, 0.0);
+    let (mut entered, mut ignored, mut progress) = (None, None, Progress::AT_ORIGIN);
+    let ray = Ray {
+        origin,
+        direction: along,
+    };
     for _ in 0..MOST_CROSSINGS {
-        let ray = Ray {
-            origin: origin + done * along,
-            direction: (1.0 - done) * along,
-        };
-        let Some(hit) = nearest_hit(inputs, ray, 1.0, ignored) else {
+        let Some(hit) = nearest_hit_from(inputs, ray, progress, 1.0, None) else {
             break;
         };
         let surface = surface_of(inputs.scene, hit);
@@ -108,7 +108,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
             let side = Side::of(&surface, along);
             entered = if entered.is_none() { Some(side) } else { None };
         }
-        done += hit.t * (1.0 - done);
+        progress = Progress::past(hit);
         ignored = Some(hit.at);
     }
     // An open sheet has been crossed, but encloses nothing.
@@ -125,24 +125,27 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, u: f
     if entered.is_some_and(|entered| leaves(along, entered) && leaves(n, entered)) {
         return false;
     }
-    // Then down: it may bend, but it must be there, under glass that lies on it too.
+    // Then down: it may bend, but it must be there, under glass that lies on it and other faces in its place too.
     let down = Ray {
         origin: origin + along,
         direction: -radius * n,
     };
-    let mut below = nearest_hit(inputs, down, 1.0, None);
-    if let Some(hit) = below
-        && inputs.scene.features.contact
-        && let met = surface_of(inputs.scene, hit)
-        && met.object != object
-        && met.material.surface == DIELECTRIC
-    {
-        below = nearest_hit(inputs, down, 1.0, Some(hit.at));
-    }
-    below.is_some_and(|hit| {
+    let mut progress = Progress::AT_ORIGIN;
+    for _ in 0..MOST_CROSSINGS {
+        let Some(hit) = nearest_hit_from(inputs, down, progress, 1.0, None) else {
+            return false;
+        };
         let there = surface_of(inputs.scene, hit);
-        there.object == object && share_there(inputs.scene, &there) > 0.0
-    })
+        if there.object == object && share_there(inputs.scene, &there) > 0.0 {
+            return true;
+        }
+        let lies_on = there.flags & (COINCIDENT | BACKED) != 0;
+        if !(lies_on || (inputs.scene.features.contact && there.material.surface == DIELECTRIC)) {
+            return false;
+        }
+        progress = Progress::past(hit);
+    }
+    false
 }
 
 /// Whether a ray meets something, past glass, that may scatter light or mirror it.

@@ -7,10 +7,12 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::camera::SeenSlice;
+use super::contact::Interface;
 use super::environment::{Environment, Sky};
 use super::gloss::Reflector;
 use super::intersect::{Hit, PlacedTriangle, Ray};
 use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
+use super::media::Media;
 use super::resolve::photons_of;
 use super::sampling::{cosine_direction, decode_direction, triangle_point};
 use super::surface::{DIELECTRIC, offset_origin, reach_of, surface_at, surface_of};
@@ -211,7 +213,8 @@ fn sample_direct(
         let Some(hit) = seen.hit else {
             return seen.of(sky(environment.at(direction), direction));
         };
-        (surface_of(inputs.scene, hit), seen)
+        let met = Interface::new(inputs, hit, direction, Media::VACUUM, random);
+        (met.surface, seen)
     } else {
         let light = choose_light(&inputs.scene.lights, choice, [first_digits, second_digits]).light;
         if is_punctual(light) {

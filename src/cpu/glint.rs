@@ -3,18 +3,19 @@
 use glam::DVec3;
 
 use super::boundary::{Boundary, fresnel_dielectric};
-use super::contact::{Encounter, transmittance};
+use super::contact::Encounter;
 use super::gloss::Reflector;
 use super::intersect::Ray;
 use super::light::{Arriving, arriving_from, choose_light, is_punctual};
+use super::media::transmittance;
 use super::surface::{DIELECTRIC, Facing};
 use super::texture::nearest_visible;
 use super::{FAR, Inputs};
 use crate::layout::{DIRECTIONAL_LIGHT, Light, Material};
 use crate::random::Random;
 
-/// Of 65,536 numbers of faces that a ray passes, the last.
-const FIRST_OF_GLINT: u32 = 65_520;
+/// Of numbers that belong to it; no instance has that index.
+const GLINT: u32 = 0x676c_696e;
 
 /// By a ray to one of the lights or, where visible points are found once, to each. `reflector`: of what isn't glass.
 pub(super) fn glint(
@@ -27,7 +28,7 @@ pub(super) fn glint(
     random: &Random,
 ) -> DVec3 {
     // Apart from the path's own numbers: those are the same where there is nothing to ask.
-    let [u, first_digits, second_digits] = [0, 1, 2].map(|number| random.of_passage(FIRST_OF_GLINT + number));
+    let [u, first_digits, second_digits] = [0, 1, 2].map(|number| random.number_of([number, GLINT]));
     let lights = &inputs.scene.lights;
     let chosen = choose_light(lights, u, [first_digits, second_digits]).light;
     let of_one = inputs.settings.slots_per_pixel == 1;

@@ -10,6 +10,9 @@ use crate::config::Accel;
 use crate::layout::{BvhRecord, LEAF, PLACEMENT_RECORD};
 use crate::scene::{PackedScene, Placement};
 
+/// Of a distance, that rounding may change.
+const TIE: f64 = 1e-9;
+
 /// The points `origin + t · direction` with t > 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Ray {
@@ -20,12 +23,12 @@ pub struct Ray {
 }
 
 /// A triangle, and the instance that puts it where it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PlacedTriangle {
-    /// Index of the triangle in the order of the BVH's leaves.
-    pub triangle: u32,
     /// Index of the instance; `None` of one in render space.
     pub instance: Option<u32>,
+    /// Index of the triangle in the order of the BVH's leaves.
+    pub triangle: u32,
 }
 
 impl PlacedTriangle {
@@ -71,9 +74,40 @@ pub struct Hit {
     pub at: PlacedTriangle,
 }
 
+/// How far a search has come along a ray: hits count that come later, those at the same distance in the order of instances and
+/// triangles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Progress {
+    t: f64,
+    at: Option<PlacedTriangle>,
+}
+
+impl Progress {
+    pub const AT_ORIGIN: Self = Self { t: 0.0, at: None };
+
+    pub fn past(hit: Hit) -> Self {
+        Self {
+            t: hit.t,
+            at: Some(hit.at),
+        }
+    }
+}
+
 /// The nearest triangle but `ignored` before t = `limit`.
 pub fn nearest_hit(inputs: &Inputs<'_>, ray: Ray, limit: f64, ignored: Option<PlacedTriangle>) -> Option<Hit> {
-    Search::new(inputs, ray, limit, ignored, false).run(inputs)
+    nearest_hit_from(inputs, ray, Progress::AT_ORIGIN, limit, ignored)
+}
+
+/// The same after `progress`.
+pub(super) fn nearest_hit_from(
+    inputs: &Inputs<'_>,
+    ray: Ray,
+    progress: Progress,
+    limit: f64,
+    ignored: Option<PlacedTriangle>,
+) -> Option<Hit> {
+    let search = Search::new(inputs, ray, limit, ignored, false);
+    Search { progress, ..search }.run(inputs)
 }
 
 /// Whether any triangle but `ignored` lies before t = `limit`.
@@ -87,6 +121,7 @@ struct Search<'a> {
     ray: Ray,
     ignored: Option<PlacedTriangle>,
     any: bool,
+    progress: Progress,
     /// t of the nearest hit so far.
     limit: f64,
     hit: Option<Hit>,
@@ -99,6 +134,7 @@ impl<'a> Search<'a> {
             ray,
             ignored,
             any,
+            progress: Progress::AT_ORIGIN,
             limit,
             hit: None,
         }
@@ -122,6 +158,13 @@ impl<'a> Search<'a> {
         self.any && self.hit.is_some()
     }
 
+    /// Whether a hit counts, and is nearer than the nearest so far.
+    fn is_nearer(&self, t: f64, at: PlacedTriangle) -> bool {
+        let later = t > self.progress.t || (t == self.progress.t && self.progress.at.is_some_and(|last| last < at));
+        let nearer = t < self.limit || (t == self.limit && self.hit.is_some_and(|hit| at < hit.at));
+        later && nearer
+    }
+
     fn test(&mut self, triangles: Range<u32>, instance: Option<u32>) {
         for triangle in triangles {
             let at = PlacedTriangle { triangle, instance };
@@ -129,7 +172,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             if let Some((t, u, v)) = intersect_triangle(self.ray, at.corners(self.scene))
-                && t < self.limit
+                && self.is_nearer(t, at)
             {
                 self.limit = t;
                 self.hit = Some(Hit { t, u, v, at });
@@ -148,7 +191,7 @@ impl<'a> Search<'a> {
         let mut stack = Vec::with_capacity(64);
         stack.push((root, 0.0));
         while let Some((reference, enter)) = stack.pop() {
-            if enter > self.limit || self.is_over() {
+            if enter > self.limit * (1.0 + TIE) || self.is_over() {
                 continue;
             }
             if reference & LEAF != 0 {
@@ -213,8 +256,9 @@ fn children(node: &BvhRecord, [low, high]: [DVec3; 2], inverse: DVec3, limit: f6
     [(node.row0, node.row1), (node.row2, node.row3)].map(|(min, max)| {
         let (t0, t1) = ((xyz(min) - low) * inverse, (xyz(max) - high) * inverse);
         let enter = t0.min(t1).max_element().max(0.0);
-        // The factor covers the rounding of the slab test: Ize, «Robust BVH Ray Traversal», JCGT 2(2), 2013.
-        let leave = t0.max(t1).min_element().min(limit) * (1.0 + 4.0 * f64::EPSILON);
+        // The factors cover the rounding of the slab test (Ize, «Robust BVH Ray Traversal», JCGT 2(2), 2013) and of faces in one
+        // place.
+        let leave = t0.max(t1).min_element().min(limit * (1.0 + TIE)) * (1.0 + 4.0 * f64::EPSILON);
         (enter <= leave).then_some((word(min), enter))
     })
 }

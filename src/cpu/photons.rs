@@ -4,15 +4,16 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::boundary::Boundary;
-use super::contact::{Encounter, choose_part, transmittance};
+use super::contact::{Encounter, choose_part};
 use super::dispersion::disperse;
 use super::emission::{emit, guide};
 use super::gloss::Reflector;
 use super::intersect::{PlacedTriangle, Ray};
 use super::light::range_window;
+use super::media::{Media, transmittance};
 use super::sampling::{cosine_direction, encode_direction};
 use super::surface::{GLOSSY, MATTE, MIRROR};
-use super::texture::{nearest_visible, share_there};
+use super::texture::nearest_visible;
 use super::vector::{mean, rgb, with_word};
 use super::{Counts, Demand, FAR, Inputs};
 use crate::config::Direct;
@@ -68,8 +69,8 @@ struct Path {
     ray: Ray,
     flux: DVec3,
     ignored: Option<PlacedTriangle>,
-    /// Material that it is in.
-    medium: Option<u32>,
+    /// That it is in.
+    media: Media,
     /// Of its light, nm.
     wavelength: Option<f64>,
     /// No bounce since the light: direct light, which the stage `direct` samples.
@@ -103,7 +104,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         ray: emission.ray,
         flux: emission.flux,
         ignored: emission.ignored,
-        medium: None,
+        media: Media::VACUUM,
         wavelength: None,
         seen_directly: true,
         caustic: true,
@@ -118,7 +119,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             return value;
         };
         let incoming = path.ray.direction;
-        let met = Encounter::new(inputs, hit, incoming, path.medium);
+        let met = Encounter::new(inputs, hit, incoming, path.media, &random);
         let (surface, mut facing) = (met.surface, met.facing);
         let mut material = surface.material;
         path.flux *= transmittance(inputs, met.through, hit.t);
@@ -126,6 +127,13 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         path.flux *= range_window(path.inverse_range, hit.t);
         if path.flux.max_element() <= 0.0 {
             return value;
+        }
+        if met.hidden {
+            path.flux *= met.tint;
+            path.media = met.beyond;
+            path.ray.origin = surface.origin_towards(incoming);
+            path.ignored = Some(surface.triangle);
+            continue;
         }
         let mut u = random.next4();
         let (mixed, rest) = choose_part(&mut material, u[3]);
@@ -156,10 +164,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
                     photons.push(Photon {
                         position_object: with_word(surface.position, surface.object | map_bit),
                         // What is there in part is seen in part as well as met in part.
-                        flux_direction: with_word(
-                            landing / share_there(inputs.scene, &surface),
-                            encode_direction(incoming),
-                        ),
+                        flux_direction: with_word(landing / met.share, encode_direction(incoming)),
                     });
                 }
             }
@@ -171,7 +176,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             landing = path.flux * layer * facing.landing_correction(incoming);
         }
         let kind = material.surface;
-        let (mut medium, mut wavelength) = (path.medium, path.wavelength);
+        let (mut media, mut wavelength) = (path.media, path.wavelength);
         let (direction, flux) = if scatters(&material) {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             let cosine = cosine_direction(facing.geometric_normal, choice, second);
@@ -201,7 +206,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
                 }
                 _ => (boundary.reflected, boundary.reflected_weight, met.through),
             };
-            medium = side;
+            media = side;
             (direction, roulette(path.flux, path.flux * layer * weight, survival))
         };
         let Some(flux) = flux else { return value };
@@ -212,7 +217,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             },
             flux,
             ignored: Some(surface.triangle),
-            medium,
+            media,
             wavelength,
             seen_directly: false,
             caustic: path.caustic && !scatters(&material),

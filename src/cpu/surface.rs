@@ -9,7 +9,7 @@ use super::gloss::{COAT_F0, Reflector, coat_passes, schlick};
 use super::intersect::{Hit, PlacedTriangle};
 use super::sampling::decode_direction;
 use super::vector::{rgb, word};
-use crate::layout::{Material, SMOOTH_SHADED, ShadingTriangle};
+use crate::layout::{Material, RANK, SMOOTH_SHADED, ShadingTriangle};
 use crate::scene::PackedScene;
 
 /// [`Material::surface`] of a Lambertian reflector.
@@ -55,6 +55,7 @@ pub(super) fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64
     let mut geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
     let mut reach = p0.abs().max(p1.abs()).max(p2.abs());
     let mut object = triangle.object;
+    let mut flags = triangle.flags;
     let mut normal_matrix = None;
     if let (Some(index), Some(placement)) = (at.instance, at.placement(scene)) {
         if placement.is_mirrored() {
@@ -62,7 +63,9 @@ pub(super) fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64
         }
         // So much the corners are uncertain by against those of other objects in the same place.
         reach = placement.reach().as_dvec3();
-        object = scene.instances[index as usize].object;
+        let instance = &scene.instances[index as usize];
+        object = instance.object;
+        flags |= instance.flags >> RANK << RANK;
         normal_matrix = Some(placement.map().matrix3.inverse().transpose());
     }
     let shading_normal = interpolated_normal(triangle, u, v, geometric_normal, normal_matrix);
@@ -78,7 +81,7 @@ pub(super) fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64
         material: scene.materials[triangle.material as usize],
         material_index: triangle.material,
         light: triangle.light,
-        flags: triangle.flags,
+        flags,
     }
 }
 

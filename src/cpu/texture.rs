@@ -4,11 +4,11 @@ use glam::{DVec2, DVec3, DVec4};
 use half::f16;
 
 use super::Inputs;
-use super::intersect::{Hit, PlacedTriangle, Ray, nearest_hit};
+use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
 use super::sampling::decode_direction;
 use super::surface::{Surface, surface_of};
 use super::vector::rgb;
-use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED};
+use crate::layout::{BACK_HIDDEN, BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED};
 use crate::random::Random;
 use crate::scene::PackedScene;
 
@@ -137,7 +137,13 @@ pub(super) fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
     }
 }
 
-/// As [`nearest_hit`], by chance through what is there in part: a pure function of the ray's place in its path.
+/// Whether a ray finds a face there: by chance where it isn't there everywhere, a pure function of the ray's place in its path.
+pub(super) fn is_face_there(scene: &PackedScene, surface: &Surface, at: PlacedTriangle, random: &Random) -> bool {
+    let thing = [at.triangle, at.instance.map_or(0, |instance| instance + 1)];
+    random.number_of(thing) < share_there(scene, surface)
+}
+
+/// As [`nearest_hit`](super::intersect::nearest_hit), by chance through what is there in part.
 pub(super) fn nearest_visible(
     inputs: &Inputs<'_>,
     ray: Ray,
@@ -145,24 +151,26 @@ pub(super) fn nearest_visible(
     ignored: Option<PlacedTriangle>,
     random: &Random,
 ) -> Option<Hit> {
-    let mut hit = nearest_hit(inputs, ray, t_max, ignored)?;
-    if !inputs.scene.features.alpha {
-        return Some(hit);
-    }
-    let mut passed = 0.0;
-    for number in 0.. {
+    nearest_seen(inputs, ray, t_max, ignored, false, random)
+}
+
+/// The same, with `culls` through backs that no camera sees.
+pub(super) fn nearest_seen(
+    inputs: &Inputs<'_>,
+    ray: Ray,
+    t_max: f64,
+    ignored: Option<PlacedTriangle>,
+    culls: bool,
+    random: &Random,
+) -> Option<Hit> {
+    let mut progress = Progress::AT_ORIGIN;
+    loop {
+        let hit = nearest_hit_from(inputs, ray, progress, t_max, ignored)?;
         let met = surface_of(inputs.scene, hit);
-        if random.of_passage(number) < share_there(inputs.scene, &met) {
-            break;
+        let hidden = met.material.flags & BACK_HIDDEN != 0 && ray.direction.dot(met.geometric_normal) > 0.0;
+        if !(culls && hidden) && is_face_there(inputs.scene, &met, hit.at, random) {
+            return Some(hit);
         }
-        // A step behind what it has passed: faces in one place are passed as one.
-        let behind = Ray {
-            origin: met.origin_towards(ray.direction),
-            ..ray
-        };
-        passed = (behind.origin - ray.origin).dot(ray.direction) / ray.direction.length_squared();
-        hit = nearest_hit(inputs, behind, t_max - passed, Some(hit.at))?;
+        progress = Progress::past(hit);
     }
-    hit.t += passed;
-    Some(hit)
 }

@@ -1,5 +1,5 @@
-//! Finds where dielectrics touch other objects. Rounding decides which of two faces in one place a ray meets first, and the
-//! step off the one would take it past the other: the kernels look for the other face where a triangle is marked.
+//! Finds faces that lie in one place. Rounding decides which of them a ray meets first, and the step off the one would take it
+//! past the other: the kernels look for the other face where a triangle is marked.
 
 use std::collections::BTreeMap;
 
@@ -8,63 +8,90 @@ use rayon::prelude::*;
 
 use super::Placement;
 use super::features::DIELECTRIC;
-use crate::layout::{BvhRecord, Instance, LEAF, Material, PLACEMENT_RECORD, ShadingTriangle};
+use crate::layout::{
+    BACK_EMITS, BACKED, BvhRecord, COINCIDENT, Instance, LEAF, Material, PLACEMENT_RECORD, ShadingTriangle, TOUCHED,
+};
 
 /// As `offset_origin` in `glsl/shared/scene.glsl`: rays leave surfaces by that much of their corners' coordinates.
 const ROUNDINGS: f32 = 16.0 / 16_777_216.0;
 /// Cosine of the angle between planes up to which faces can lie on each other over more than a line.
 const PARALLEL: f32 = 0.99;
-/// Triangles of all instances of a primitive that are looked at; where there are more, all are taken to touch something,
-/// which costs the kernels a look.
+/// Triangles of all instances of a primitive that are looked at. Where there are more, dielectrics are all taken to touch
+/// something, which costs the kernels a look, and others to touch nothing.
 const MOST_PLACED: usize = 1 << 20;
+/// Beside the flags of a triangle: a face of the same object lies there and looks to the other side.
+const DOUBLED: u32 = 1 << 31;
 
-/// Whether each triangle is a dielectric's and may lie, with some part, on a triangle of another object, wherever an instance
-/// puts it.
-pub(super) fn touched(
+/// What lies in one place.
+pub(super) struct Contacts {
+    /// Of each triangle: [`TOUCHED`], [`COINCIDENT`], [`BACKED`].
+    pub flags: Vec<u32>,
+    /// Whether some object has faces in one place that look to opposite sides.
+    pub doubled: bool,
+}
+
+/// Finds what lies in one place, wherever instances put it. A superset where dielectrics are concerned.
+pub(super) fn contacts(
     records: &[BvhRecord],
     triangles: &[ShadingTriangle],
     instances: &[Instance],
     materials: &[Material],
-) -> Vec<bool> {
-    let is_dielectric = |triangle: &ShadingTriangle| materials[triangle.material as usize].surface == DIELECTRIC;
+) -> Contacts {
     let shared = instances.iter().map(|instance| instance.first_triangle).min();
     let own = &triangles[..shared.map_or(triangles.len(), |first| first as usize)];
     let scene = Scene {
         records,
-        faces: own.iter().map(|triangle| Face::new(triangle, None)).collect(),
+        triangles,
+        materials,
+        faces: own.par_iter().map(|triangle| Face::new(triangle, None)).collect(),
         places: instances.iter().map(Place::new).collect(),
     };
-    let own = own.par_iter().zip(&scene.faces);
-    let mut touched: Vec<bool> = own
-        .map(|(triangle, face)| is_dielectric(triangle) && face.touches_any(&scene))
+    let mut found: Vec<u32> = own
+        .par_iter()
+        .zip(&scene.faces)
+        .map(|(triangle, face)| face.contacts(&scene, triangle.material))
         .collect();
-    touched.resize(triangles.len(), false);
+    found.resize(triangles.len(), 0);
     let mut placed: BTreeMap<(usize, usize), Vec<&Place>> = BTreeMap::new();
     for (instance, place) in instances.iter().zip(&scene.places) {
         let shared = (instance.first_triangle as usize, instance.triangle_count as usize);
         placed.entry(shared).or_default().push(place);
     }
     for ((first, count), places) in placed {
-        if !is_dielectric(&triangles[first]) {
+        let found = &mut found[first..first + count];
+        let material = triangles[first].material;
+        if places.len() * count > MOST_PLACED {
+            found.fill(if scene.is_dielectric(material) { TOUCHED } else { 0 });
             continue;
         }
-        let all = places.len() * count > MOST_PLACED;
-        let triangles = touched[first..first + count].par_iter_mut().zip(&triangles[first..]);
-        triangles.for_each(|(touched, triangle)| {
-            let touches = |place: &&Place| Face::new(triangle, Some(*place)).touches_any(&scene);
-            *touched = all || places.iter().any(touches);
+        let triangles = found.par_iter_mut().zip(&triangles[first..]);
+        triangles.for_each(|(found, triangle)| {
+            let of_place = |place: &&Place| Face::new(triangle, Some(*place)).contacts(&scene, material);
+            *found = places.iter().map(of_place).fold(0, |all, of_one| all | of_one);
         });
     }
-    touched
+    let doubled = found.par_iter().any(|found| found & DOUBLED != 0);
+    for found in &mut found {
+        *found &= !DOUBLED;
+    }
+    Contacts { flags: found, doubled }
 }
 
 /// What may touch.
 struct Scene<'a> {
     records: &'a [BvhRecord],
+    triangles: &'a [ShadingTriangle],
+    materials: &'a [Material],
     /// Triangles that aren't shared.
     faces: Vec<Face>,
     /// Of the instances.
     places: Vec<Place>,
+}
+
+impl Scene<'_> {
+    fn is_dielectric(&self, material: u32) -> bool {
+        self.materials[material as usize].surface == DIELECTRIC
+    }
 }
 
 /// Where an instance is.
@@ -100,6 +127,7 @@ impl Place {
 
 struct Face {
     corners: [Vec3; 3],
+    /// Of the front.
     normal: Vec3,
     object: u32,
     low: Vec3,
@@ -121,9 +149,14 @@ impl Face {
         let [a, b, c] = corners;
         let largest = a.abs().max(b.abs()).max(c.abs());
         let reach = 2.0 * ROUNDINGS * largest.element_sum();
+        let normal = (b - a).as_dvec3().cross((c - a).as_dvec3()).normalize().as_vec3();
         Self {
             corners,
-            normal: (b - a).as_dvec3().cross((c - a).as_dvec3()).normalize().as_vec3(),
+            normal: if place.is_some_and(|place| place.placement.is_mirrored()) {
+                -normal
+            } else {
+                normal
+            },
             object: place.map_or(object, |place| place.object),
             low: a.min(b).min(c),
             high: a.max(b).max(c),
@@ -132,7 +165,14 @@ impl Face {
         }
     }
 
-    fn touches_any(&self, scene: &Scene<'_>) -> bool {
+    /// The flags of a triangle of this material, and [`DOUBLED`].
+    fn contacts(&self, scene: &Scene<'_>, material: u32) -> u32 {
+        let mut found = 0;
+        let all = if scene.is_dielectric(material) {
+            TOUCHED | DOUBLED
+        } else {
+            COINCIDENT | BACKED | DOUBLED
+        };
         let xyz = |[x, y, z, _]: [f32; 4]| Vec3::new(x, y, z);
         // The boxes of render space know nothing of what instances in them are uncertain by.
         let uncertain = Vec3::splat(scene.places.iter().map(|place| place.reach).fold(0.0, f32::max));
@@ -160,22 +200,24 @@ impl Face {
                     stack.push((root, Some(&scene.places[number])));
                     break;
                 }
-                let touches = match place {
-                    None => self.touches(&scene.faces[number]),
+                let other_material = scene.triangles[number].material;
+                found |= match place {
+                    None => self.contact(&scene.faces[number], scene, [material, other_material]),
                     Some(_) => {
                         let corners = [record.row0, record.row1, record.row2].map(xyz);
-                        self.touches(&Self::of_corners(corners, 0, place))
+                        let other = Self::of_corners(corners, 0, place);
+                        self.contact(&other, scene, [material, other_material])
                     }
                 };
-                if touches {
-                    return true;
+                if found == all {
+                    return found;
                 }
                 if record.row3[1].to_bits() == 1 {
                     break;
                 }
             }
         }
-        false
+        found
     }
 
     fn meets_box(&self, low: Vec3, high: Vec3) -> bool {
@@ -183,16 +225,52 @@ impl Face {
         (self.low - reach).cmple(high).all() && (self.high + reach).cmpge(low).all()
     }
 
-    /// Whether the faces can share more than a line: a superset of those that do.
+    /// What the other face adds to the flags.
+    fn contact(&self, other: &Self, scene: &Scene<'_>, materials: [u32; 2]) -> u32 {
+        let cosine = self.normal.dot(other.normal);
+        let same_object = self.object == other.object;
+        if cosine.abs() <= PARALLEL || (same_object && cosine > 0.0) || !self.touches(other) {
+            return 0;
+        }
+        let [own, others] = materials.map(|material| &scene.materials[material as usize]);
+        if own.surface == DIELECTRIC {
+            return if same_object { TOUCHED | DOUBLED } else { TOUCHED };
+        }
+        // On what is opaque, glass makes no difference.
+        if others.surface == DIELECTRIC || !self.overlaps(other) {
+            return 0;
+        }
+        let shines_through = others.flags & BACK_EMITS != 0 && others.emission != [0.0; 3];
+        match (same_object, cosine > 0.0 || shines_through) {
+            (true, _) => DOUBLED,
+            (false, true) => COINCIDENT,
+            (false, false) => BACKED,
+        }
+    }
+
+    /// Whether the faces, which are parallel, can share a point: a superset of those that do.
     fn touches(&self, other: &Self) -> bool {
-        let parallel = self.normal.dot(other.normal).abs() > PARALLEL;
-        let reach = Vec3::splat(other.place_reach);
-        if self.object == other.object || !parallel || !self.meets_box(other.low - reach, other.high + reach) {
+        let margin = Vec3::splat(other.place_reach);
+        if !self.meets_box(other.low - margin, other.high + margin) {
             return false;
         }
         let height = |corner: &Vec3| other.normal.dot(*corner - other.corners[0]);
         let [a, b, c] = [0, 1, 2].map(|corner| height(&self.corners[corner]));
-        let reach = self.reach.max(other.place_reach);
+        let reach = self.reach.max(other.reach);
         a.min(b).min(c) <= reach && a.max(b).max(c) >= -reach
+    }
+
+    /// Whether the faces, which lie in one plane, share more than a line: no edge of either has the other face on its far side.
+    fn overlaps(&self, other: &Self) -> bool {
+        let reach = self.reach.max(other.reach);
+        let is_beside = |face: &Self, beside: &Self| {
+            (0..3).any(|edge| {
+                let [from, to, opposite] = [0, 1, 2].map(|i| face.corners[(edge + i) % 3]);
+                let mut inwards = face.normal.cross(to - from).normalize_or_zero();
+                inwards *= inwards.dot(opposite - from).signum();
+                beside.corners.iter().all(|corner| inwards.dot(*corner - from) <= reach)
+            })
+        };
+        !is_beside(self, other) && !is_beside(other, self)
     }
 }

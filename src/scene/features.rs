@@ -1,8 +1,8 @@
 //! What of the renderer a scene needs: the kernels are specialised for it and have no code for the rest.
 
 use crate::layout::{
-    BACK_HIDDEN, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH,
-    SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED,
+    BACK_HIDDEN, BACKED, COINCIDENT, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT,
+    SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED,
 };
 
 /// [`Material::surface`] of a mirror.
@@ -58,8 +58,12 @@ features! {
     absorption: "ABSORPTION",
     /// Dielectrics that bend each wavelength its own way.
     dispersion: "DISPERSION",
-    /// Boundaries of dielectrics that lie on faces of other objects.
+    /// Boundaries of dielectrics that lie on other faces.
     contact: "CONTACT",
+    /// Dielectrics inside of others, or overlapping them.
+    nested: "NESTED",
+    /// Faces in one place.
+    coincidence: "COINCIDENCE",
     /// Lights that are points or directions.
     punctual: "PUNCTUAL_LIGHTS",
     /// An environment.
@@ -104,6 +108,7 @@ impl SceneFeatures {
             features.textured |= triangle.flags & TEXTURED != 0;
             features.alpha |= triangle.flags & SEE_THROUGH != 0;
             features.contact |= triangle.flags & TOUCHED != 0;
+            features.coincidence |= triangle.flags & (COINCIDENT | BACKED) != 0;
         }
         for light in lights {
             features.punctual |= [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&light.kind);

@@ -33,6 +33,7 @@ mod material;
 mod meshopt;
 mod morph;
 mod near_lights;
+mod nesting;
 pub mod object_grid;
 mod packed;
 mod placement;

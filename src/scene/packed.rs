@@ -8,15 +8,16 @@ use glam::{DVec3, Vec3, Vec4};
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
 use super::material::normal_reflectance;
 use super::near_lights::NearLights;
+use super::nesting::Nesting;
 use super::object_grid::object_grids;
 use super::{
     Alpha, Dielectric, Environment, Gloss, MaterialTextures, SHARED, Scene, Surface, area, bvh, contact, environment,
     light_table,
 };
 use crate::layout::{
-    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, HavelTriangle, Instance, Light, MASK, Material, NO_LIGHT,
-    NO_TEXTURE, OPAQUE, ObjectGrid, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED, ShadingTriangle, TEXTURED, TOUCHED,
-    TRIANGLE_LIGHT, TextureLookup,
+    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, HavelTriangle, Instance, Light, MASK, MIRRORED, Material,
+    NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, RANK, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED, ShadingTriangle,
+    TEXTURED, TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// What the ray stages read, in the order of the BVH's leaves.
@@ -69,7 +70,7 @@ impl PackedScene {
     /// Builds the hierarchy and precomputes the triangles.
     ///
     /// # Errors
-    /// A text, if there are too many triangles.
+    /// A text, if there are too many triangles, or too many materials for glass that overlaps.
     pub fn new(scene: &Scene) -> Result<Self, String> {
         let SharedTriangles {
             ranges,
@@ -105,15 +106,21 @@ impl PackedScene {
             shading_triangles[light.triangle as usize].light = index as u32;
         }
         let materials: Vec<Material> = scene.materials.iter().map(material).collect();
-        let instances = instances(scene, &placed, &bvh.shared);
-        let touched = contact::touched(&bvh.records, &shading_triangles, &instances, &materials);
-        for (triangle, touched) in shading_triangles.iter_mut().zip(touched) {
-            triangle.flags |= if touched { TOUCHED } else { 0 };
+        let nesting = Nesting::of(scene)?;
+        let instances = instances(scene, &placed, &bvh.shared, &nesting.ranks);
+        let contacts = contact::contacts(&bvh.records, &shading_triangles, &instances, &materials);
+        for (triangle, flags) in shading_triangles.iter_mut().zip(contacts.flags) {
+            triangle.flags |= flags;
+            if triangle.object != SHARED {
+                triangle.flags |= nesting.ranks[triangle.object as usize] << RANK;
+            }
         }
-        let features = SceneFeatures {
-            instanced: !instances.is_empty(),
-            ..SceneFeatures::of(&shading_triangles, &materials, &lights)
-        };
+        let mut features = SceneFeatures::of(&shading_triangles, &materials, &lights);
+        features.instanced = !instances.is_empty();
+        features.nested = nesting.overlaps;
+        features.coincidence |= features.contact || contacts.doubled;
+        // Where a solid has no thickness, it is a thin wall.
+        features.thin_walls |= features.contact && contacts.doubled;
         let mut texels = scene.textures.texels.clone();
         texels.resize(texels.len().next_multiple_of(4), 0);
         let (object_grids, object_cells) = object_grids(scene);
@@ -195,7 +202,7 @@ fn shared_triangles(scene: &Scene) -> SharedTriangles {
     found
 }
 
-fn instances(scene: &Scene, placed: &[bvh::Instance], shared: &[Range<u32>]) -> Vec<Instance> {
+fn instances(scene: &Scene, placed: &[bvh::Instance], shared: &[Range<u32>], ranks: &[u32]) -> Vec<Instance> {
     let objects = (0..)
         .zip(&scene.objects)
         .filter(|(_, object)| object.placement.is_some());
@@ -204,7 +211,7 @@ fn instances(scene: &Scene, placed: &[bvh::Instance], shared: &[Range<u32>]) -> 
         Instance {
             rows: placed.placement.rows,
             object,
-            mirrored: placed.placement.is_mirrored().into(),
+            flags: if placed.placement.is_mirrored() { MIRRORED } else { 0 } | ranks[object as usize] << RANK,
             first_triangle: triangles.start,
             triangle_count: triangles.len() as u32,
         }

@@ -19,10 +19,12 @@ fn on_device(bench: &mut Bench, points: &[VisiblePoint], radii2: &[f32], statist
     let mut recording = Recording::new();
     recording.fill(BufferId::Status, 0);
     recording.fill(BufferId::CoverageOf, 0);
-    let constants = vec![
-        ("SAMPLER", bench.config.sampler as u32),
-        ("INSTANCED", u32::from(bench.scene.features.instanced)),
-    ];
+    let features = bench.scene.features.constants();
+    let features = features.map(|(name, present)| (name, u32::from(present)));
+    let constants: Vec<_> = [("SAMPLER", bench.config.sampler as u32)]
+        .into_iter()
+        .chain(features)
+        .collect();
     let push = [0, bench.config.coverage_points(0)];
     recording.dispatch(
         StageDesc::new(&shaders::COVERAGE, radii2.len() as u32)

@@ -8,7 +8,7 @@ use ppm_vk::config::{Accel, EmissionChoice, RenderConfig, TriangleTest};
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
-use ppm_vk::layout::{Settings, ShadingTriangle, TOUCHED};
+use ppm_vk::layout::{MIRRORED, Settings, ShadingTriangle, TOUCHED};
 use ppm_vk::metrics::compare;
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::scene::{PackedScene, Placement, Scene};
@@ -147,7 +147,10 @@ fn the_same_meshes_are_shared_whatever_their_nodes_transforms() {
     assert_eq!((apart.instances.len(), apart.shared_primitives()), (0, 0));
     assert_eq!(shared.seen_triangles(), apart.seen_triangles());
     assert!(shared.features.instanced && !apart.features.instanced);
-    let mirrored = shared.instances.iter().filter(|instance| instance.mirrored != 0);
+    let mirrored = shared
+        .instances
+        .iter()
+        .filter(|instance| instance.flags & MIRRORED != 0);
     assert_eq!(mirrored.count(), 2);
     // What stands on the floor touches it, in whichever way it is stored.
     let touched = |scene: &PackedScene| {

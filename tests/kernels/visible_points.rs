@@ -138,14 +138,12 @@ fn direct_on_device(bench: &mut Bench, turn: CameraTurn) -> Vec<DirectSum> {
     let mut recording = Recording::new();
     recording.fill(BufferId::DirectSums, 0);
     let slots = bench.renderer.sizes().slots();
-    let constants = vec![
+    let mut constants = vec![
         ("SAMPLE_LIGHTS", u32::from(bench.config.direct == Direct::Light)),
         ("SAMPLER", bench.config.sampler as u32),
-        ("GLOSSY", u32::from(bench.scene.features.glossy)),
-        ("PUNCTUAL_LIGHTS", u32::from(bench.scene.features.punctual)),
-        ("ENVIRONMENT", u32::from(bench.scene.features.environment)),
-        ("INSTANCED", u32::from(bench.scene.features.instanced)),
     ];
+    let features = bench.scene.features.constants();
+    constants.extend(features.map(|(name, present)| (name, u32::from(present))));
     recording.dispatch(
         StageDesc::new(&shaders::DIRECT, slots)
             .constants(constants)

@@ -107,6 +107,17 @@ impl Model {
         self.mesh(material, box_sides(low, high).as_flattened());
     }
 
+    /// A box with a hollow: one object. Without an outside, the hollow alone, its fronts inside.
+    pub fn shell(&mut self, material: usize, outer: [Vec3; 2], hollow: [Vec3; 2]) {
+        let [low, high] = hollow;
+        let inside = box_sides(low, high).as_flattened().to_vec();
+        let mut triangles: Vec<_> = inside.into_iter().map(|[a, b, c]| [a, c, b]).collect();
+        if outer[0] != outer[1] {
+            triangles.extend(box_sides(outer[0], outer[1]).as_flattened());
+        }
+        self.mesh(material, &triangles);
+    }
+
     /// A sphere of flat triangles, or with the shading normals of a true sphere. Its corners lie on the true sphere.
     pub fn sphere(&mut self, material: usize, centre: Vec3, radius: f32, smooth: bool) {
         let triangles = sphere_triangles(16);

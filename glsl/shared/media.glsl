@@ -1,0 +1,76 @@
+// The solid dielectrics that a ray is in. Where several overlap, the one of the lowest rank is there, and the boundaries of the
+// others don't count: Schmidt and Budge, «Simple Nested Dielectrics in Ray Traced Images», Journal of Graphics Tools 7(2), 2002.
+// Include after scene.glsl.
+
+// A medium's name: its object's rank, then its material. VACUUM comes last.
+const uint VACUUM = 0xffffffffu;
+
+// Their names in order, VACUUM where there are fewer. Of more than four the highest ranks are forgotten.
+struct Media {
+    uint first;
+    uvec3 others; // NESTED
+};
+
+const Media IN_VACUUM = Media(VACUUM, uvec3(VACUUM));
+
+uint medium_of(Surface surface) {
+    return (surface.flags & ~RANK_BELOW) | surface.material;
+}
+
+uint material_of_medium(uint medium) {
+    return medium & RANK_BELOW;
+}
+
+Media without(Media media, uint medium) {
+    if (NESTED) {
+        bvec3 gone;
+        gone.x = media.first == medium;
+        gone.y = gone.x || media.others.x == medium;
+        gone.z = gone.y || media.others.y == medium;
+        bool last_gone = gone.z || media.others.z == medium;
+        media.first = gone.x ? media.others.x : media.first;
+        media.others.x = gone.y ? media.others.y : media.others.x;
+        media.others.y = gone.z ? media.others.z : media.others.y;
+        media.others.z = last_gone ? VACUUM : media.others.z;
+    } else {
+        media.first = VACUUM;
+    }
+    return media;
+}
+
+// At most once.
+Media with(Media media, uint medium) {
+    if (NESTED) {
+        media = without(media, medium);
+        uvec4 rest = uvec4(media.first, media.others);
+        media.first = min(rest.x, medium);
+        media.others = max(uvec3(min(rest.yzw, medium)), rest.xyz);
+    } else {
+        media.first = medium;
+    }
+    return media;
+}
+
+// What a ray leaves at the back of a face that bounds this medium. One that it isn't in bounds the medium that is there: an inner
+// wall that is an object of its own.
+uint left_medium(Media media, uint medium) {
+    bool is_in = true;
+    if (NESTED) {
+        is_in = media.first == medium || any(equal(media.others, uvec3(medium))) || media.first == VACUUM;
+    }
+    return is_in ? medium : media.first;
+}
+
+float ior_of_medium(uint medium) {
+    return medium == VACUUM ? 1.0 : TEXEL(Materials, MATERIAL_TEXELS * material_of_medium(medium) + 1u).w;
+}
+
+// What a medium leaves of light over a distance.
+vec3 transmittance(uint medium, float distance) {
+    bool absorbs = ABSORPTION && medium != VACUUM;
+    vec3 absorption = vec3(0.0);
+    if (absorbs) {
+        absorption = TEXEL(Materials, MATERIAL_TEXELS * material_of_medium(medium) + 4u).rgb;
+    }
+    return exp(-absorption * distance);
+}

@@ -1,0 +1,91 @@
+//! The solid dielectrics that a ray is in: the counterpart of `glsl/shared/media.glsl`.
+
+use glam::DVec3;
+
+use super::Inputs;
+use super::surface::Surface;
+use super::vector::rgb;
+use crate::layout::{Material, RANK};
+
+/// A medium: its object's rank, then its material. [`VACUUM`] comes last.
+type Medium = u32;
+
+const VACUUM: Medium = u32::MAX;
+
+/// Those that a ray is in, in order. Where several overlap, the first is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Media([Medium; 4]);
+
+impl Media {
+    pub const VACUUM: Self = Self([VACUUM; 4]);
+
+    /// What is there.
+    pub fn first(&self) -> Medium {
+        self.0[0]
+    }
+
+    /// Behind a boundary into a medium. Where none overlap, it is the only one.
+    pub fn with(self, medium: Medium, nested: bool) -> Self {
+        if !nested {
+            return Self([medium, VACUUM, VACUUM, VACUUM]);
+        }
+        let [a, b, c, d] = self.without(medium, nested).0;
+        let mut all = [a, b, c, d, medium];
+        all.sort_unstable();
+        Self([all[0], all[1], all[2], all[3]])
+    }
+
+    /// Behind a boundary out of it.
+    pub fn without(self, medium: Medium, nested: bool) -> Self {
+        if !nested {
+            return Self::VACUUM;
+        }
+        let mut media = self.0.map(|other| if other == medium { VACUUM } else { other });
+        media.sort_unstable();
+        Self(media)
+    }
+}
+
+/// What a face bounds for a ray that meets it in these media. At the back of one that it isn't in, that is the medium that is
+/// there: an inner wall that is an object of its own.
+pub(super) fn bounded_medium(media: Media, surface: &Surface, front: bool, nested: bool) -> Medium {
+    let medium = (surface.flags >> RANK << RANK) | surface.material_index;
+    let is_in = !nested || media.0.contains(&medium) || media == Media::VACUUM;
+    if front || is_in { medium } else { media.first() }
+}
+
+fn material_of_medium<'a>(inputs: &Inputs<'a>, medium: Medium) -> Option<&'a Material> {
+    let index = (medium & !(u32::MAX << RANK)) as usize;
+    (medium != VACUUM).then(|| &inputs.scene.materials[index])
+}
+
+/// Index of refraction.
+pub(super) fn ior_of_medium(inputs: &Inputs<'_>, medium: Medium) -> f64 {
+    material_of_medium(inputs, medium).map_or(1.0, |material| material.ior.into())
+}
+
+/// What a medium leaves of light over a distance.
+pub(super) fn transmittance(inputs: &Inputs<'_>, media: Media, distance: f64) -> DVec3 {
+    material_of_medium(inputs, media.first())
+        .map_or(DVec3::ONE, |material| (-rgb(material.absorption) * distance).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lowest_of_what_a_ray_is_in_is_there_whatever_the_order() {
+        let media = Media::VACUUM.with(3, true).with(1, true).with(2, true);
+        assert_eq!(media.first(), 1);
+        assert_eq!(media, Media::VACUUM.with(2, true).with(3, true).with(1, true));
+        assert_eq!(media.without(1, true).first(), 2);
+        assert_eq!(media.without(2, true).first(), 1);
+        assert_eq!(media.without(4, true), media, "it isn't in that");
+        assert_eq!(media.with(2, true), media, "at most once");
+        assert_eq!(media.without(1, true).without(2, true).without(3, true), Media::VACUUM);
+        let full = media.with(4, true);
+        assert_eq!(full.with(5, true), full, "the highest is forgotten");
+        assert_eq!(full.with(0, true).first(), 0);
+    }
+}

@@ -1,0 +1,184 @@
+//! Faces in one place: which of them a ray meets is no chance.
+
+use glam::Vec3;
+use ppm_vk::backend::Backend;
+use ppm_vk::config::{Accel, Direct, RenderConfig, TriangleTest};
+use ppm_vk::cpu;
+use ppm_vk::film::Image;
+use ppm_vk::scene::{PackedScene, Scene};
+use serde_json::json;
+
+use super::model::{Model, parallelogram};
+use super::sound::{render, square};
+
+/// Turned, so that the coordinates have all their bits, or with all of a face's corners on one coordinate.
+const TURNS: [[f64; 4]; 2] = [[0.0, 0.0, 0.0, 1.0], [0.1825742, 0.3651484, 0.5477226, 0.7302967]];
+
+/// Mean red of pictures of a scene, with what says how each was made: by kernels with both hierarchies and triangle tests, and by
+/// their twin; with direct light by rays and by photons.
+fn pictures(scene: &Scene) -> Vec<(String, f64)> {
+    let packed = PackedScene::new(scene).expect("packed scene");
+    let mean = |image: &Image| {
+        let sum: f64 = image.pixels().iter().map(|pixel| f64::from(pixel[0])).sum();
+        sum / image.pixels().len() as f64
+    };
+    let mut means = Vec::new();
+    for (direct, accel, triangle_test) in [
+        (Direct::Light, Accel::Bvh, TriangleTest::Watertight),
+        (Direct::Photons, Accel::Brute, TriangleTest::Watertight),
+        (Direct::Light, Accel::Bvh, TriangleTest::Havel),
+    ] {
+        let config = RenderConfig {
+            direct,
+            accel,
+            triangle_test,
+            ..square(8, 40_000)
+        };
+        let image = render(scene, 0, 4, config).image;
+        means.push((format!("{direct:?}, {accel:?}, {triangle_test:?}"), mean(&image)));
+    }
+    let config = RenderConfig {
+        direct: Direct::Photons,
+        ..square(8, 40_000)
+    };
+    let mut twin = cpu::Renderer::new(&packed, &scene.cameras[0], config).expect("a renderer");
+    for _ in 0..4 {
+        twin.iterate().expect("an iteration");
+    }
+    means.push(("photons, CPU".to_owned(), mean(&twin.resolve().expect("a picture"))));
+    means
+}
+
+/// Asserts that all pictures of a room show this radiance. The walls shine with 1 from all sides; `build` puts things into it,
+/// and the camera looks down to its middle. False alarms: the noise is a third of the tolerance; what goes wrong is a quarter of
+/// the light at least.
+#[track_caller]
+fn assert_shows(expected: f64, what: &str, build: impl Fn(&mut Model)) {
+    for turn in TURNS {
+        let mut model = Model::new();
+        let walls = model.black(1.0);
+        model.room(walls, Vec3::NEG_ONE, Vec3::ONE);
+        build(&mut model);
+        model.camera(Vec3::new(0.1, 0.5, 0.2), Vec3::new(0.02, 0.0, 0.01), 0.2);
+        model.file.add_parent(json!({"rotation": turn}));
+        for (by, mean) in pictures(&model.scene()) {
+            assert!(
+                (mean - expected).abs() < 0.12 * expected,
+                "{what}, turned by {turn:?}, {by}: {mean}, {expected} expected"
+            );
+        }
+    }
+}
+
+/// A floor of half the room's width; looking up or down.
+fn floor(up: bool, scale: f32) -> [[Vec3; 3]; 2] {
+    let triangles = parallelogram(Vec3::new(-0.5, 0.0, -0.5) * scale, Vec3::Z * scale, Vec3::X * scale);
+    triangles.map(|[a, b, c]| if up { [a, b, c] } else { [a, c, b] })
+}
+
+#[test]
+fn of_doubled_faces_a_ray_meets_the_one_that_looks_to_it_in_every_order() {
+    for white_first in [true, false] {
+        assert_shows(0.8, &format!("white first: {white_first}"), |model| {
+            let (white, black) = (model.matte([0.8; 3], 0.0), model.black(0.0));
+            let mut faces = [(white, floor(true, 1.0)), (black, floor(false, 1.0))];
+            if !white_first {
+                faces.reverse();
+            }
+            for (material, triangles) in faces {
+                model.mesh(material, &triangles);
+            }
+        });
+    }
+    assert_shows(0.8, "both in one mesh", |model| {
+        let white = model.matte([0.8; 3], 0.0);
+        model.mesh(white, [floor(false, 1.0), floor(true, 1.0)].as_flattened());
+    });
+}
+
+/// A label of the wall's colour that is half there, or a black one that is cut out. Whichever a path meets, the light there is
+/// that of the place.
+#[test]
+fn a_label_shows_the_wall_that_it_lies_on_where_it_is_clear() {
+    for (mode, albedo, alpha) in [("BLEND", 0.8, 0.5), ("MASK", 0.0, 0.3)] {
+        for label_first in [true, false] {
+            for scale in [1.0, 0.7] {
+                let what = format!("{mode}, label first: {label_first}, {scale} of the wall's size");
+                assert_shows(0.8, &what, |model| {
+                    let (white, label) = (model.matte([0.8; 3], 0.0), model.matte([albedo; 3], 0.0));
+                    model.file.set(&format!("/materials/{label}/alphaMode"), json!(mode));
+                    let color = format!("/materials/{label}/pbrMetallicRoughness/baseColorFactor");
+                    model.file.set(&color, json!([albedo, albedo, albedo, alpha]));
+                    let mut faces = [(white, floor(true, 1.0)), (label, floor(true, scale))];
+                    if label_first {
+                        faces.reverse();
+                    }
+                    for (material, triangles) in faces {
+                        model.mesh(material, &triangles);
+                    }
+                });
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lamp_flush_with_a_ceiling_is_seen_in_every_order() {
+    for lamp_first in [true, false] {
+        assert_shows(3.0, &format!("lamp first: {lamp_first}"), |model| {
+            let (white, lamp) = (model.matte([0.8; 3], 0.0), model.black(3.0));
+            let mut faces = [(lamp, floor(true, 0.8)), (white, floor(true, 1.0))];
+            if !lamp_first {
+                faces.reverse();
+            }
+            for (material, triangles) in faces {
+                model.mesh(material, &triangles);
+            }
+        });
+    }
+}
+
+/// In light of 1 from all sides a pane shows 1 but for what is behind it: a black wall, so that it shows what it reflects. One
+/// pane's 4 % at right angles, or two panes' 7.7 %.
+#[test]
+fn a_doubled_pane_reflects_as_one_or_two_and_a_box_without_thickness_as_a_pane() {
+    let boxes = [floor(true, 1.0), floor(false, 1.0)];
+    for (what, thin, objects) in [
+        (
+            "two objects, back to back",
+            true,
+            vec![vec![floor(true, 1.0)], vec![floor(false, 1.0)]],
+        ),
+        (
+            "two objects alike",
+            true,
+            vec![vec![floor(true, 1.0)], vec![floor(true, 1.0)]],
+        ),
+        ("one object", true, vec![boxes.to_vec()]),
+        ("a box without thickness", false, vec![boxes.to_vec()]),
+    ] {
+        for turn in TURNS {
+            let mut model = Model::new();
+            let (bright, dark) = (model.black(10.0), model.black(0.0));
+            let glass = model.glass(1.5);
+            if thin {
+                model
+                    .file
+                    .remove(&format!("/materials/{glass}/extensions/KHR_materials_volume"));
+            }
+            model.quad(bright, Vec3::new(-2.0, 1.0, -2.0), Vec3::X * 4.0, Vec3::Z * 4.0);
+            model.quad(dark, Vec3::new(-2.0, -1.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+            for object in &objects {
+                model.mesh(glass, object.as_flattened());
+            }
+            model.camera(Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO, 0.1);
+            model.file.add_parent(json!({"rotation": turn}));
+            for (by, mean) in pictures(&model.scene()) {
+                assert!(
+                    (0.39..0.78).contains(&mean),
+                    "{what}, turned by {turn:?}, {by}: {mean}, 0.4 to 0.77 expected"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Dielectrics inside of others, touching or overlapping them.
+
+use glam::Vec3;
+use ppm_vk::backend::Backend;
+use ppm_vk::cpu;
+use ppm_vk::scene::{PackedScene, Scene};
+use serde_json::json;
+
+use super::model::Model;
+use super::sound::{render, square};
+
+/// Boxes about the origin, which is what the layers along the line of sight are.
+struct Body {
+    ior: f32,
+    /// What light keeps of a unit of length.
+    keeps: f32,
+    /// Half of its side, and of a hollow in it.
+    half: f32,
+    hollow: Option<f32>,
+}
+
+/// Radiance of the middle pixel by kernels and by their twin. Light of 1 comes from all sides.
+fn middle(bodies: &[Body]) -> [f64; 2] {
+    let scene = scene(bodies);
+    let config = square(16, 1000);
+    let on_device = render(&scene, 0, 64, config.clone()).image;
+    let packed = PackedScene::new(&scene).expect("packed scene");
+    let mut twin = cpu::Renderer::new(&packed, &scene.cameras[0], config).expect("a renderer");
+    for _ in 0..64 {
+        twin.iterate().expect("an iteration");
+    }
+    [on_device, twin.resolve().expect("a picture")].map(|image| {
+        let sum: f64 = image.pixels().iter().map(|pixel| f64::from(pixel[0])).sum();
+        sum / image.pixels().len() as f64
+    })
+}
+
+fn scene(bodies: &[Body]) -> Scene {
+    let mut model = Model::new();
+    let walls = model.black(1.0);
+    model.room(walls, Vec3::splat(-4.0), Vec3::splat(4.0));
+    for body in bodies {
+        let material = model.glass(body.ior);
+        let volume = format!("/materials/{material}/extensions/KHR_materials_volume");
+        model.file.set(
+            &volume,
+            json!({
+                "thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": vec![body.keeps; 3]
+            }),
+        );
+        let half = |half: f32| (Vec3::splat(-half), Vec3::splat(half));
+        let (low, high) = half(body.half);
+        match body.hollow {
+            None => model.block(material, low, high),
+            Some(hollow) => {
+                let (inner_low, inner_high) = half(hollow);
+                model.shell(material, [low, high], [inner_low, inner_high]);
+            }
+        }
+    }
+    // All rays are close to the axis.
+    model.camera(Vec3::new(0.0, 0.0, 3.5), Vec3::ZERO, 0.02);
+    model.scene()
+}
+
+/// What is seen along the axis of layers: index of refraction and kept share of each, in light of 1 from both sides. Adding up
+/// all reflections: van de Hulst's adding of layers, without phases.
+fn seen(layers: &[(f64, f64)]) -> f64 {
+    let fresnel = |from: f64, to: f64| ((from - to) / (from + to)).powi(2);
+    let iors: Vec<f64> = [1.0]
+        .into_iter()
+        .chain(layers.iter().map(|layer| layer.0))
+        .chain([1.0])
+        .collect();
+    // Of what lies before the layer: what it reflects to the front and to the back, and passes.
+    let r = fresnel(iors[0], iors[1]);
+    let (mut front, mut back, mut passed) = (r, r, 1.0 - r);
+    for (i, (_, keeps)) in layers.iter().enumerate() {
+        let r = fresnel(iors[i + 1], iors[i + 2]);
+        let between = 1.0 - back * keeps * keeps * r;
+        let new_passed = passed * keeps * (1.0 - r) / between;
+        front += passed * passed * keeps * keeps * r / between;
+        back = r + (1.0 - r) * (1.0 - r) * keeps * keeps * back / between;
+        passed = new_passed;
+    }
+    front + passed
+}
+
+#[track_caller]
+fn assert_seen(expected: f64, tolerance: f64, what: &str, bodies: &[Body]) {
+    for (by, seen) in ["device", "CPU"].into_iter().zip(middle(bodies)) {
+        assert!(
+            (seen / expected - 1.0).abs() < tolerance,
+            "{what}, by {by}: {seen}, {expected} expected"
+        );
+    }
+}
+
+/// Indices of 1 leave nothing but absorption, along a length that is known.
+#[test]
+fn liquid_that_overlaps_its_glass_absorbs_along_the_length_that_it_fills() {
+    for overlap in [-1e-3, 0.0, 1e-3, 0.05] {
+        let liquid = Body {
+            ior: 1.0,
+            keeps: 0.5,
+            half: 0.9 + overlap,
+            hollow: None,
+        };
+        let glass = Body {
+            ior: 1.0,
+            keeps: 1.0,
+            half: 1.0,
+            hollow: Some(0.9),
+        };
+        // The glass has the smaller volume, and so is what is there.
+        let length = 2.0 * f64::from(0.9f32.min(0.9 + overlap));
+        assert_seen(
+            0.5f64.powf(length),
+            2e-4,
+            &format!("overlap {overlap}"),
+            &[liquid, glass],
+        );
+    }
+}
+
+/// With an overlap of a thousandth the same as where they touch, and what its layers say. False alarms: the noise of 256 pixels
+/// after 64 iterations is .15 %.
+#[test]
+fn liquid_in_glass_looks_alike_whether_they_touch_or_overlap() {
+    let expected = seen(&[(1.5, 1.0), (1.33, 0.5f64.powf(1.8)), (1.5, 1.0)]);
+    for overlap in [0.0, 1e-3] {
+        for liquid_first in [true, false] {
+            let mut bodies = [
+                Body {
+                    ior: 1.33,
+                    keeps: 0.5,
+                    half: 0.9 + overlap,
+                    hollow: None,
+                },
+                Body {
+                    ior: 1.5,
+                    keeps: 1.0,
+                    half: 1.0,
+                    hollow: Some(0.9),
+                },
+            ];
+            if !liquid_first {
+                bodies.reverse();
+            }
+            assert_seen(
+                expected,
+                0.01,
+                &format!("overlap {overlap}, liquid first: {liquid_first}"),
+                &bodies,
+            );
+        }
+    }
+}
+
+/// Between air and liquid there is a gap, if small: two boundaries more.
+#[test]
+fn a_gap_between_liquid_and_glass_is_two_boundaries_more() {
+    let air = (1.0, 1.0);
+    let expected = seen(&[(1.5, 1.0), air, (1.33, 0.5f64.powf(1.798)), air, (1.5, 1.0)]);
+    let bodies = [
+        Body {
+            ior: 1.33,
+            keeps: 0.5,
+            half: 0.899,
+            hollow: None,
+        },
+        Body {
+            ior: 1.5,
+            keeps: 1.0,
+            half: 1.0,
+            hollow: Some(0.9),
+        },
+    ];
+    assert_seen(expected, 0.01, "gap", &bodies);
+}
+
+/// A block of glass in water without touching its surface: the boundary is that between glass and water, and water absorbs on
+/// both sides of it.
+#[test]
+fn glass_under_water_is_in_water() {
+    let side = (1.33, 0.4f64.powf(0.5));
+    let expected = seen(&[side, (2.0, 1.0), side]);
+    let bodies = [
+        Body {
+            ior: 1.33,
+            keeps: 0.4,
+            half: 1.0,
+            hollow: None,
+        },
+        Body {
+            ior: 2.0,
+            keeps: 1.0,
+            half: 0.5,
+            hollow: None,
+        },
+    ];
+    assert_seen(expected, 0.01, "submerged", &bodies);
+}
+
+/// A bubble may be a mesh of its own whose fronts look inwards: behind it is air, not glass.
+#[test]
+fn a_bubble_with_its_fronts_inside_is_air() {
+    let expected = seen(&[(1.5, 0.4f64.powf(0.5)), (1.0, 1.0), (1.5, 0.4f64.powf(0.5))]);
+    let bodies = [
+        Body {
+            ior: 1.5,
+            keeps: 0.4,
+            half: 1.0,
+            hollow: None,
+        },
+        Body {
+            ior: 1.5,
+            keeps: 0.4,
+            half: 0.0,
+            hollow: Some(0.5),
+        },
+    ];
+    assert_seen(expected, 0.01, "bubble", &bodies);
+}
