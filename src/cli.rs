@@ -39,6 +39,7 @@ pub enum Outcome {
 /// # Errors
 /// The work failed; the error's text is one line.
 pub fn run() -> Result<Outcome> {
+    interrupt::survive_file_limits()?;
     let arguments = Arguments::parse();
     match arguments.command {
         None => render::render(&arguments.render),

@@ -2,12 +2,11 @@
 //!
 //! An output file is whole or absent. [`check_writable`] tells before the rendering whether it can be written.
 
-mod files;
 mod hdr;
 mod openexr;
 mod png;
 
-pub use files::{check_writable, write_whole};
+pub use crate::files::{check_writable, write_whole};
 pub use hdr::read_hdr;
 pub use openexr::{read_exr, write_exr};
 pub use png::{write_png, write_rgb8};

@@ -22,6 +22,7 @@ pub mod cpu;
 pub mod emission;
 pub mod error;
 pub mod estimate;
+pub mod files;
 pub mod film;
 pub mod gather;
 pub mod gpu;

@@ -2,9 +2,9 @@
 
 use super::Image;
 use crate::error::{Error, Result};
+use crate::files;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder};
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -16,12 +16,7 @@ const MAX_PIXELS: u64 = 1 << 27;
 /// # Errors
 /// A file that can't be opened, is damaged or cut short, or has more than 2²⁷ pixels.
 pub fn read_hdr(path: &Path) -> Result<Image> {
-    let file = File::open(path).map_err(|error| {
-        Error::file(
-            path,
-            format!("can't be opened ({error}): check the path and its permissions"),
-        )
-    })?;
+    let file = files::open(path)?;
     let damaged = |error: image::ImageError| {
         Error::file(
             path,

@@ -2,6 +2,7 @@
 
 use super::{Image, Metadata, write_whole};
 use crate::error::{Error, Result};
+use crate::files;
 use exr::image::read::image::ReadLayers;
 use exr::image::read::layers::ReadChannels;
 use exr::image::read::specific_channels::ReadSpecificChannel;
@@ -12,7 +13,6 @@ use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOr
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::SmallVec;
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
@@ -127,12 +127,7 @@ fn sort_attributes(file: &mut [u8]) {
 /// A file that can't be opened, is damaged or cut short, has no RGB layer, has subsampled channels, or has more than
 /// 2²⁷ pixels.
 pub fn read_exr(path: &Path) -> Result<Image> {
-    let file = File::open(path).map_err(|error| {
-        Error::file(
-            path,
-            format!("can't be opened ({error}): check the path and its permissions"),
-        )
-    })?;
+    let file = files::open(path)?;
     decode(BufReader::new(file), path)
 }
 

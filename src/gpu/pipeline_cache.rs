@@ -3,13 +3,14 @@
 //! A cache is no output: where there is no folder, or it can't be read or written, kernels are compiled anew.
 
 use std::fs;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use ash::vk;
 
 use super::context::{Context, OrVulkan};
 use crate::error::Result;
+use crate::files::{self, Writing};
 
 /// Larger files are not what this program wrote.
 const MOST_BYTES: u64 = 256 << 20;
@@ -88,10 +89,12 @@ fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
 
 /// The driver's part of a file, if it is whole.
 fn read(file: &Path) -> Option<Vec<u8>> {
-    if fs::metadata(file).ok()?.len() > MOST_BYTES {
+    let opened = files::open(file).ok()?;
+    if opened.metadata().ok()?.len() > MOST_BYTES {
         return None;
     }
-    let mut bytes = fs::read(file).ok()?;
+    let mut bytes = Vec::new();
+    opened.take(MOST_BYTES).read_to_end(&mut bytes).ok()?;
     let (sum, data) = bytes.split_at_checked(CHECKSUM)?;
     if checksum(data) != sum {
         return None;
@@ -103,6 +106,7 @@ fn read(file: &Path) -> Option<Vec<u8>> {
 fn write(file: &Path, data: &[u8]) -> std::io::Result<()> {
     let folder = file.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)?;
+    let _writing = Writing::begin();
     let mut temporary = tempfile::NamedTempFile::new_in(folder)?;
     temporary.write_all(&checksum(data))?;
     temporary.write_all(data)?;
@@ -140,6 +144,16 @@ mod tests {
         fs::write(&file, b"short").expect("a short file");
         assert_eq!(read(&file), None);
         assert_eq!(read(&folder.path().join("absent")), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_in_its_place_is_not_waited_for() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pipe = folder.path().join("pipelines.bin");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.expect("mkfifo").success());
+        assert_eq!(read(&pipe), None);
     }
 
     #[test]

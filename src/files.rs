@@ -1,10 +1,62 @@
-//! Output files that are whole or absent.
+//! Files: those that are read are regular ones, those that are written are whole or absent.
 
 use crate::error::{Error, Result};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, is_separator};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
+
+/// Writers at work.
+static WRITERS: Mutex<usize> = Mutex::new(0);
+
+fn writers() -> MutexGuard<'static, usize> {
+    WRITERS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// While one is alive, [`unless_writing`] does nothing.
+#[derive(Debug)]
+pub struct Writing(());
+
+impl Writing {
+    /// Begins.
+    pub fn begin() -> Self {
+        *writers() += 1;
+        Self(())
+    }
+}
+
+impl Drop for Writing {
+    fn drop(&mut self) {
+        *writers() -= 1;
+    }
+}
+
+/// Does `end`, which ends the process, unless something is being written: no temporary file is left behind. Nothing begins to
+/// be written meanwhile.
+pub fn unless_writing(end: impl FnOnce()) {
+    let writers = writers();
+    if *writers == 0 {
+        end();
+    }
+}
+
+/// Opens a file for reading.
+///
+/// # Errors
+/// What can't be opened, and what is no regular file: opening a pipe would wait for a writer, and a device may have no end.
+pub fn open(path: &Path) -> Result<File> {
+    let unopened = |error: io::Error| {
+        Error::file(
+            path,
+            format!("can't be opened ({error}): check the path and its permissions"),
+        )
+    };
+    if !fs::metadata(path).map_err(unopened)?.is_file() {
+        return Err(Error::file(path, "is no regular file: give the path of one"));
+    }
+    File::open(path).map_err(unopened)
+}
 
 /// Checks that a file can be written at `path`, and leaves nothing behind: to be called before a long rendering.
 ///
@@ -12,6 +64,7 @@ use tempfile::NamedTempFile;
 /// A path that names no file, a folder, or something else than a regular file; a file that may not be overwritten; a
 /// folder that doesn't exist or can't be written to.
 pub fn check_writable(path: &Path) -> Result<()> {
+    let _writing = Writing::begin();
     temporary_beside(path).map(drop)
 }
 
@@ -26,6 +79,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
             format!("can't be written ({error}): check the disk's free space and permissions"),
         )
     };
+    let _writing = Writing::begin();
     let mut temporary = temporary_beside(path)?;
     temporary.write_all(bytes).map_err(failed)?;
     // Without it a power cut soon after the renaming could leave an empty file of the right name.
@@ -146,6 +200,39 @@ mod tests {
             assert_eq!(error(write_whole(&path, b"content")), checked);
         }
         assert_eq!(names(folder), ["file"]);
+    }
+
+    #[test]
+    fn nothing_ends_the_process_while_a_file_is_written() {
+        let mut ended = false;
+        let first = Writing::begin();
+        let second = Writing::begin();
+        drop(first);
+        unless_writing(|| ended = true);
+        assert!(!ended, "one writer of two is still at work");
+        drop(second);
+        // Other tests write too: sooner or later none does.
+        while !ended {
+            unless_writing(|| ended = true);
+        }
+    }
+
+    #[test]
+    fn what_is_no_regular_file_is_not_opened() {
+        let folder = tempdir().expect("a temporary folder");
+        let mut paths = vec![folder.path().to_owned()];
+        if cfg!(unix) {
+            let pipe = folder.path().join("pipe");
+            let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+            assert!(made.expect("mkfifo").success());
+            paths.extend([pipe, "/dev/zero".into()]);
+        }
+        for path in paths {
+            let error = open(&path).expect_err("no regular file").to_string();
+            assert!(error.contains("is no regular file"), "{error}");
+        }
+        let error = open(&folder.path().join("none")).expect_err("no file").to_string();
+        assert!(error.contains("can't be opened"), "{error}");
     }
 
     #[cfg(unix)]
