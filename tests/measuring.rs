@@ -245,13 +245,13 @@ fn a_render_stops_at_the_target_error_and_writes_its_estimate() {
 fn no_measurement_overwrites_what_it_reads() {
     let folder = TempDir::new().expect("folder");
     let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/references/cornell.exr");
-    let copy = folder.path().join("r.exr");
+    let copy = folder.path().join("r");
     std::fs::copy(reference, &copy).expect("a copy");
     std::fs::copy(reference, folder.path().join("r.png")).expect("a copy");
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.gltf");
     for arguments in [
         vec!["compare", reference, "r.png", "--heatmap", "r.png"],
-        vec!["converge", "--scene", scene, "--reference", "r.exr", "--csv", "r.exr"],
+        vec!["converge", "--scene", scene, "--reference", "r", "--csv", "r"],
         vec!["bench", "gather", "--json", "f", "--plot", "f"],
     ] {
         let output = ppm_vk(folder.path(), &arguments);
@@ -259,7 +259,7 @@ fn no_measurement_overwrites_what_it_reads() {
         assert!(stderr(&output).contains("would overwrite"), "{}", stderr(&output));
     }
     assert_eq!(
-        std::fs::read(&copy).expect("r.exr"),
+        std::fs::read(&copy).expect("r"),
         std::fs::read(reference).expect("the reference")
     );
 }

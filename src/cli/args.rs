@@ -8,6 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::bench::{BenchFeatures, BenchGather, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
+use super::outputs::named;
 use super::scene::SceneArguments;
 use crate::config::{Accel, Direct, EmissionChoice, Estimator, Sampler, TriangleTest};
 use crate::gather;
@@ -86,7 +87,7 @@ pub struct RenderArguments {
     #[command(flatten)]
     pub read: SceneArguments,
     /// Linear RGB OpenEXR picture [default: the scene's name with .exr, in the current folder].
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE.exr", value_parser = exr_file)]
     pub output: Option<PathBuf>,
     /// Tone-mapped picture.
     #[arg(long, value_name = "FILE.png", value_parser = png_file)]
@@ -167,10 +168,10 @@ pub struct RenderArguments {
     #[arg(long)]
     pub profile: bool,
     /// Write the profile as JSON.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = named("json"))]
     pub profile_json: Option<PathBuf>,
-    /// Write every launch as a Chrome or Perfetto trace.
-    #[arg(long, value_name = "FILE")]
+    /// Write every launch as a Chrome or Perfetto trace (JSON).
+    #[arg(long, value_name = "FILE", value_parser = named("json"))]
     pub trace: Option<PathBuf>,
     /// No progress bar.
     #[arg(long)]
@@ -219,6 +220,15 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 /// A file name that says what the file will be.
+fn exr_file(name: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(name);
+    match path.extension() {
+        Some(extension) if extension.eq_ignore_ascii_case("exr") => Ok(path),
+        _ => Err("an OpenEXR picture is written: its name must end in .exr (--png writes a PNG)".to_owned()),
+    }
+}
+
+/// Likewise.
 pub fn png_file(name: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(name);
     match path.extension() {

@@ -8,7 +8,7 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory};
 
 use super::args::{Arguments, gather_method, png_file, positive, resolution};
-use super::outputs::check_outputs;
+use super::outputs::{check_outputs, named};
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
 use crate::config::{EmissionChoice, Probe, RenderConfig};
@@ -53,10 +53,10 @@ pub struct BenchGather {
     #[arg(long, value_name = "N", default_value_t = 10_000_000, requires = "scaling", value_parser = clap::value_parser!(u32).range(31_623..))]
     most_photons: u32,
     /// Write all figures as JSON.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = named("json"))]
     json: Option<PathBuf>,
     /// Draw the figures.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", value_parser = named("svg"))]
     plot: Option<PathBuf>,
     /// Write a false-colour picture of the k-means clusters, at the last resolution.
     #[arg(long, value_name = "FILE.png", value_parser = png_file, conflicts_with = "scaling")]
@@ -76,6 +76,8 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
     let inputs: Vec<&Path> = arguments.scene.as_deref().into_iter().collect();
     check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
     let scene = load(arguments.scene.as_deref())?;
+    let inputs: Vec<&Path> = scene.files.iter().map(PathBuf::as_path).collect();
+    check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
     let packed = PackedScene::new(&scene).map_err(anyhow::Error::msg)?;
     let bench = GatherBench {
         scene: &packed,

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 
 use super::args::seconds;
-use super::outputs::check_outputs;
+use super::outputs::{check_outputs, named};
 use super::scene::SceneArguments;
 use super::{Outcome, interrupt, print};
 use crate::bench::{Converge, Curve, converge, converge_table, csv, plot_convergence};
@@ -40,10 +40,10 @@ pub struct ConvergeArguments {
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u32,
     /// Write the curves as comma-separated values.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = named("csv"))]
     csv: Option<PathBuf>,
     /// Draw the curves.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", value_parser = named("svg"))]
     plot: Option<PathBuf>,
     /// Camera, by name or index [default: the scene's first].
     #[arg(long, value_name = "NAME|INDEX")]
@@ -137,6 +137,8 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
     check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
     let reference = read_exr(&arguments.reference)?;
     let scene = arguments.read.load(&arguments.scene, true)?;
+    inputs.extend(scene.files.iter().map(PathBuf::as_path));
+    check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
     for warning in &scene.warnings {
         say!("warning: {warning}");
     }

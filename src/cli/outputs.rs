@@ -1,28 +1,141 @@
 //! The files that a command writes.
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use crate::film::check_writable;
 
+/// What a path names: files are one file if any of these is the same.
+struct Place {
+    /// The entry in its folder, which writing replaces.
+    entry: PathBuf,
+    /// What it is a link to.
+    file: Option<PathBuf>,
+    /// The file system's number of it, which all its names have in common.
+    number: Option<(u64, u64)>,
+}
+
+impl Place {
+    fn of(path: &Path) -> Self {
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let absolute = || std::path::absolute(path).unwrap_or(path.to_owned());
+        let entry = match (folder.canonicalize(), path.file_name()) {
+            (Ok(folder), Some(name)) => folder.join(name),
+            _ => absolute(),
+        };
+        Self {
+            entry: as_compared(entry),
+            file: path.canonicalize().ok().map(as_compared),
+            number: number(path),
+        }
+    }
+
+    fn is(&self, other: &Self) -> bool {
+        let names = |place: &Self, name: &PathBuf| place.entry == *name || place.file.as_ref() == Some(name);
+        names(other, &self.entry)
+            || self.file.as_ref().is_some_and(|file| names(other, file))
+            || self.number.is_some() && self.number == other.number
+    }
+}
+
+/// Where file systems take capitals for small letters as a rule, so does a comparison.
+fn as_compared(path: PathBuf) -> PathBuf {
+    if cfg!(any(windows, target_os = "macos")) {
+        path.to_string_lossy().to_lowercase().into()
+    } else {
+        path
+    }
+}
+
+#[cfg(unix)]
+fn number(path: &Path) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt as _;
+    fs::metadata(path).ok().map(|metadata| (metadata.dev(), metadata.ino()))
+}
+
+#[cfg(not(unix))]
+fn number(_: &Path) -> Option<(u64, u64)> {
+    None
+}
+
 /// Fails if two outputs, or an output and an input, are one file, or if an output can't be written.
 pub fn check_outputs<'a>(inputs: &[&Path], outputs: impl Iterator<Item = &'a Path>) -> Result<()> {
-    let place = |path: &Path| {
-        path.canonicalize()
-            .or_else(|_| std::path::absolute(path))
-            .unwrap_or(path.to_owned())
-    };
     let outputs: Vec<&Path> = outputs.collect();
-    let mut taken: Vec<_> = inputs.iter().map(|input| place(input)).collect();
+    let mut taken: Vec<_> = inputs.iter().map(|input| (*input, "reads", Place::of(input))).collect();
     for output in &outputs {
-        let file = place(output);
-        ensure!(
-            !taken.contains(&file),
-            "{}: would overwrite the scene or another file of this command; name another",
-            output.display()
-        );
-        taken.push(file);
+        let place = Place::of(output);
+        if let Some((other, what, _)) = taken.iter().find(|(.., other)| place.is(other)) {
+            anyhow::bail!(
+                "{}: would overwrite {}, which this command {what}; name another file",
+                output.display(),
+                other.display()
+            );
+        }
+        taken.push((output, "writes too", place));
     }
     outputs.into_iter().try_for_each(|output| Ok(check_writable(output)?))
+}
+
+/// Formats that the end of a name may say.
+const ENDINGS: [&str; 12] = [
+    "exr", "hdr", "png", "jpg", "jpeg", "webp", "svg", "json", "csv", "gltf", "glb", "bin",
+];
+
+/// A parser of names of files of one format: those that say another one are refused.
+pub fn named(format: &'static str) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
+    move |name| {
+        let path = PathBuf::from(name);
+        let ending = path
+            .extension()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_ascii_lowercase();
+        if ending != format && ENDINGS.contains(&ending.as_str()) {
+            return Err(format!(
+                "{} is written, not {}: name a file that ends in .{format}",
+                format.to_uppercase(),
+                ending.to_uppercase()
+            ));
+        }
+        Ok(path)
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::symlink;
+
+    #[test]
+    fn a_file_is_known_by_any_of_its_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("d")).expect("a folder");
+        symlink(at("d"), at("link-to-d")).expect("a link");
+        fs::write(at("a.exr"), "a").expect("a file");
+        symlink(at("a.exr"), at("link")).expect("a link");
+        fs::hard_link(at("a.exr"), at("d/hard")).expect("a link");
+        symlink(at("b.exr"), at("to-nothing")).expect("a link");
+        let is = |one: &str, other: &str| Place::of(&at(one)).is(&Place::of(&at(other)));
+        for (one, other) in [
+            ("a.exr", "a.exr"),
+            ("a.exr", "link"),
+            ("link", "d/hard"),
+            ("a.exr", "d/../a.exr"),
+            // Files that aren't there yet.
+            ("b.exr", "d/../b.exr"),
+            ("d/c.exr", "link-to-d/c.exr"),
+            ("./b.exr", "b.exr"),
+        ] {
+            assert!(is(one, other) && is(other, one), "{one} is {other}");
+        }
+        for (one, other) in [("a.exr", "b.exr"), ("b.exr", "d/b.exr"), ("to-nothing", "a.exr")] {
+            assert!(!is(one, other), "{one} isn't {other}");
+        }
+    }
 }

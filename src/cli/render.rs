@@ -40,6 +40,9 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
 
     let quiet = arguments.quiet;
     let scene = arguments.read.load(path, quiet)?;
+    let mut inputs = arguments.read.inputs(path);
+    inputs.extend(scene.files.iter().map(PathBuf::as_path));
+    check_outputs(&inputs, outputs(arguments, &output))?;
     for warning in &scene.warnings {
         say!("warning: {warning}");
     }

@@ -83,6 +83,14 @@ pub(super) fn read_uri(uri: &str, folder: &Path) -> Check<Vec<u8>> {
     }
 }
 
+/// The files that buffers and images refer to, whether they are read or not.
+pub(super) fn referred_files<'a>(root: &'a Root, folder: &'a Path) -> impl Iterator<Item = PathBuf> + 'a {
+    let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+    let images = root.images.iter().filter_map(|image| image.uri.as_deref());
+    let files = buffers.chain(images).filter(|uri| data_of(uri).is_none());
+    files.filter_map(|uri| Some(folder.join(relative_path(uri).ok()?)))
+}
+
 /// `length` bytes from byte `start`, if there are as many.
 pub(super) fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
     let end = usize::try_from(start.checked_add(length)?).ok()?;

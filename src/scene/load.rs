@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::animation::Pose;
+use super::buffer::referred_files;
 use super::diagnostic::{Check, Warnings, quote};
 use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::graph::place_nodes;
@@ -64,7 +65,8 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     for object in &geometry.objects {
         used[object.material as usize] = true;
     }
-    let mut textures = TextureReader::new(&document, path.parent().unwrap_or(Path::new("")));
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut textures = TextureReader::new(&document, folder);
     let mut materials = material::materials(root, &used, &mut textures, &mut warnings)?;
     if used.last() == Some(&false) {
         materials.pop();
@@ -92,6 +94,9 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         cameras,
         normalisation: geometry.normalisation,
         dropped_triangles: geometry.dropped_triangles,
+        files: std::iter::once(path.to_owned())
+            .chain(referred_files(root, folder))
+            .collect(),
         warnings: Vec::new(),
     };
     if scene.cameras.is_empty() {

@@ -56,6 +56,8 @@ pub use placement::Placement;
 pub(crate) use sphere::Sphere;
 pub use texture::Textures;
 
+use std::path::PathBuf;
+
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 pub use environment::Environment;
@@ -324,6 +326,8 @@ pub struct Scene {
     pub normalisation: Normalisation,
     /// Triangles of zero area that were dropped.
     pub dropped_triangles: usize,
+    /// The file that it is from, and those that this one refers to.
+    pub files: Vec<PathBuf>,
     /// What the file asks for and the renderer doesn't do, one line each.
     pub warnings: Vec<String>,
 }
