@@ -17,7 +17,16 @@ pub trait Backend {
     ///
     /// # Errors
     /// Whatever the device can't do.
-    fn iterate(&mut self) -> Result<Run>;
+    fn iterate(&mut self) -> Result<Run> {
+        self.iterate_unless(&|| false).map(Option::unwrap_or_default)
+    }
+    /// The same, unless `stop`, which is asked between batches of photon paths, says that there is no time for the rest. An
+    /// iteration that is cut short is left out of the picture, and there is none to be returned; but the first one ends with
+    /// the paths that it has emitted by then, so that there is a picture.
+    ///
+    /// # Errors
+    /// As [`Backend::iterate`].
+    fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>>;
     /// The picture so far (eq. 4), and what tells its bias.
     ///
     /// # Errors

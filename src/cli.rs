@@ -17,6 +17,7 @@ mod outputs;
 mod progress;
 mod render;
 mod scene;
+mod work;
 
 use std::io::Write as _;
 

@@ -105,3 +105,11 @@ pub struct Run {
     /// From the submission to the fence.
     pub wall: Duration,
 }
+
+impl Run {
+    /// Adds what came after it.
+    pub fn add(&mut self, later: Self) {
+        self.launches.extend(later.launches);
+        self.wall += later.wall;
+    }
+}

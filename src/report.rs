@@ -45,6 +45,8 @@ pub struct Subject {
     pub gather: String,
     /// Photon paths of an iteration.
     pub photons: u32,
+    /// Photon paths of all iterations.
+    pub photons_emitted: u64,
     /// Where it ran.
     pub device: DeviceDescription,
     /// What else happened.
@@ -140,7 +142,7 @@ impl Profile {
              {} photon paths, {}",
             100.0 * stages_us / wall_us,
             self.runs.len(),
-            self.runs.len() as u64 * u64::from(subject.photons),
+            subject.photons_emitted,
             subject.counters.photons()
         );
         text
@@ -236,6 +238,7 @@ mod tests {
             resolution: [1, 1],
             gather: "naive".into(),
             photons: 1,
+            photons_emitted: 20,
             device: DeviceDescription {
                 name: "d".into(),
                 driver: "v".into(),

@@ -280,19 +280,202 @@ fn outputs_overwrite_neither_each_other_nor_the_scene() {
     let copy = folder.path().join("a.b.gltf");
     std::fs::copy(scene("cornell.gltf"), &copy).expect("scene");
     std::fs::copy(scene("cornell.bin"), folder.path().join("cornell.bin")).expect("buffer");
-    assert_fails(
-        &folder,
-        &small_render(folder.path(), &copy, &["-o", "a.b.gltf"]),
-        &["overwrite"],
-    );
-    assert_fails(
-        &folder,
-        &small_render(folder.path(), &copy, &["-o", "x.png", "--png", "./x.png"]),
-        &["overwrite"],
-    );
+    for [trace, profile] in [
+        ["a.b.gltf", "p.json"],
+        ["cornell.bin", "p.json"],
+        ["one", "./one"],
+        ["one", "d/../one"],
+    ] {
+        std::fs::create_dir_all(folder.path().join("d")).expect("a folder");
+        let more = ["--trace", trace, "--profile-json", profile];
+        let output = small_render(folder.path(), &copy, &more);
+        // The name alone says that some hold something else.
+        let text = stderr(&output);
+        assert!(
+            matches!(output.status.code(), Some(1 | 2))
+                && (text.contains("overwrite") || text.contains("JSON is written")),
+            "{more:?}: {text}"
+        );
+        assert!(
+            !folder.path().join("a.b.exr").exists(),
+            "{more:?}: rendered before the check"
+        );
+    }
+    let buffer = std::fs::read(scene("cornell.bin")).expect("buffer");
+    assert!(std::fs::read(folder.path().join("cornell.bin")).expect("buffer") == buffer);
     let output = small_render(folder.path(), &copy, &[]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(folder.path().join("a.b.exr").exists(), "{:?}", files(folder.path()));
+}
+
+/// A scene whose buffer and texture have names of outputs, so that the names alone don't protect them.
+#[test]
+fn what_the_scene_refers_to_is_not_overwritten() {
+    let folder = TempDir::new().expect("folder");
+    let text = std::fs::read_to_string(scene("cornell.gltf")).expect("scene");
+    let mut json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    json["buffers"][0]["uri"] = "geometry".into();
+    json["images"] = serde_json::json!([{"uri": "wood.png"}]);
+    std::fs::write(folder.path().join("a.gltf"), json.to_string()).expect("scene");
+    std::fs::copy(scene("cornell.bin"), folder.path().join("geometry")).expect("buffer");
+    std::fs::write(folder.path().join("wood.png"), "a picture that no material uses").expect("image");
+    for more in [["--trace", "geometry"], ["--png", "wood.png"]] {
+        let output = small_render(folder.path(), &folder.path().join("a.gltf"), &more);
+        assert_fails(&folder, &output, &["would overwrite", more[1]]);
+    }
+}
+
+#[test]
+fn names_that_say_another_format_are_refused() {
+    let folder = TempDir::new().expect("folder");
+    let path = scene("cornell.gltf");
+    let path = path.to_str().expect("UTF-8");
+    for (flag, name) in [
+        ("--output", "x.png"),
+        ("--output", "x"),
+        ("--png", "x.exr"),
+        ("--trace", "x.exr"),
+        ("--profile-json", "x.PNG"),
+    ] {
+        assert_refused(&ppm_vk(folder.path(), &["--scene", path, flag, name]), flag);
+    }
+    assert!(files(folder.path()).is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_not_read() {
+    let folder = TempDir::new().expect("folder");
+    for name in ["pipe.hdr", "pipe.exr"] {
+        let made = Command::new("mkfifo").arg(folder.path().join(name)).status();
+        assert!(made.expect("mkfifo").success());
+        let output = small_render(
+            folder.path(),
+            &scene("lights.gltf"),
+            &["--environment", name, "-o", "o.exr"],
+        );
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert!(text.contains(name) && text.contains("is no regular file"), "{text}");
+    }
+    let output = ppm_vk(folder.path(), &["compare", "pipe.exr", "/dev/zero"]);
+    assert!(
+        stderr(&output).contains("pipe.exr: is no regular file"),
+        "{}",
+        stderr(&output)
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn an_output_that_cannot_be_written_does_not_stop_the_others() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell.gltf");
+    let scene = scene.to_str().expect("UTF-8");
+    // No file may be longer than 16 blocks, which are 512 or 1,024 bytes, as the shell has it.
+    let script = format!(
+        "ulimit -f 16; exec '{}' --scene '{scene}' --resolution 64x64 --iterations 4 --photons 1000 -o o.exr --png p.png \
+         --profile-json p.json --trace t.json",
+        env!("CARGO_BIN_EXE_ppm-vk")
+    );
+    let output = Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(folder.path())
+        .env("XDG_CACHE_HOME", folder.path().join("cache"))
+        .output()
+        .expect("sh");
+    assert_fails(&folder, &output, &["o.exr: can't be written", "File too large"]);
+    let left = files(folder.path());
+    assert!(left.contains(&"p.json".to_owned()), "{left:?}");
+    assert!(
+        !left.iter().any(|file| file.starts_with(".ppm-vk")),
+        "a temporary file is left: {left:?}"
+    );
+}
+
+/// A render that would take an hour.
+#[cfg(unix)]
+fn long_render(folder: &Path, more: &[&str]) -> std::process::Child {
+    let scene = scene("cornell.gltf");
+    let scene = scene.to_str().expect("UTF-8");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_ppm-vk"))
+        .args(["--scene", scene, "--resolution", "16x16", "-o", "o.exr"])
+        .args(more)
+        .current_dir(folder)
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("ppm-vk starts");
+    // The radius is printed when the iterations begin.
+    let mut stderr = std::io::BufReader::new(child.stderr.take().expect("stderr"));
+    std::io::BufRead::read_line(&mut stderr, &mut String::new()).expect("a line");
+    // What is said later has a reader as long as the program runs.
+    std::thread::spawn(move || std::io::copy(&mut stderr, &mut std::io::sink()));
+    child
+}
+
+#[cfg(unix)]
+fn send(signal: &str, child: &std::process::Child) {
+    let kill = Command::new("kill").args([signal, &child.id().to_string()]).status();
+    assert!(kill.expect("kill").success());
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_that_are_sent_twice_at_once_still_leave_the_picture() {
+    let folder = TempDir::new().expect("folder");
+    for signal in ["-TERM", "-INT", "-HUP"] {
+        let mut child = long_render(folder.path(), &["--iterations", "10000000", "--photons", "1000"]);
+        send(signal, &child);
+        send(signal, &child);
+        assert_eq!(child.wait().expect("exit").code(), Some(130), "{signal}");
+        assert_eq!(files(folder.path()), ["o.exr"], "{signal}");
+        ppm_vk::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
+        std::fs::remove_file(folder.path().join("o.exr")).expect("removed");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_iteration_that_is_too_long_is_cut_by_the_time_and_by_ctrl_c() {
+    let folder = TempDir::new().expect("folder");
+    let endless = ["--photons", "4000000000", "--iterations", "3"];
+    for backend in ["vulkan", "cpu"] {
+        let start = std::time::Instant::now();
+        let timed = [&endless[..], &["--time", "0.5", "--backend", backend]].concat();
+        let status = long_render(folder.path(), &timed).wait().expect("exit");
+        assert_eq!(status.code(), Some(0), "{backend}");
+        let picture = ppm_vk::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
+        let mean = ppm_vk::metrics::mean(&picture)[1];
+        // Of the whole picture, whatever is seen in so few pixels.
+        assert!(
+            (0.2..0.8).contains(&mean),
+            "{backend}: the photons aren't divided by those emitted: {mean}"
+        );
+        let mut child = long_render(folder.path(), &[&endless[..], &["--backend", backend]].concat());
+        send("-INT", &child);
+        assert_eq!(child.wait().expect("exit").code(), Some(130), "{backend}");
+        let took = start.elapsed().as_secs();
+        assert!(took < 100, "{backend}: two renders took {took} s: they weren't cut");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn signals_that_the_program_is_told_to_ignore_stay_ignored() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell.gltf");
+    let scene = scene.to_str().expect("UTF-8");
+    let script = format!(
+        "trap '' HUP; '{}' --scene '{scene}' --resolution 16x16 --time 2 --photons 1000 -o o.exr & sleep 1.5; kill -HUP $!; \
+         wait $!",
+        env!("CARGO_BIN_EXE_ppm-vk")
+    );
+    let output = Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(folder.path())
+        .output()
+        .expect("sh");
+    assert_eq!(output.status.code(), Some(0), "SIGHUP ended it: {}", stderr(&output));
 }
 
 #[test]

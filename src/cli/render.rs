@@ -2,24 +2,25 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::outputs::check_outputs;
 use super::progress::{BUILDING, Limits, Progress, while_showing, with_prefix};
+use super::work::{Rendered, Work};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
 use crate::config::{EmissionChoice, Estimator, RenderConfig, Sampler};
-use crate::estimate::{ErrorEstimate, of_one_photon};
+use crate::estimate::{ErrorEstimate, RelativeError, of_one_photon};
+use crate::files::Writing;
 use crate::film::{self, Metadata};
 use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
-use crate::report::{Profile, Subject};
+use crate::report::Subject;
 use crate::scene::{Camera, PackedScene};
 
 /// Width of a picture without --resolution.
@@ -80,7 +81,6 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         );
     }
 
-    let start = Instant::now();
     let limits = Limits {
         iterations: arguments.iterations.or_else(|| {
             let endless = arguments.time.is_none() && arguments.target_error.is_none();
@@ -89,85 +89,109 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         time: arguments.time,
         error: arguments.target_error,
     };
-    let progress = Progress::new(limits, arguments.quiet);
-    let mut profile = Profile::default();
-    let profiled = arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some();
-    let estimate = ErrorEstimate::new(&config, of_one_photon(&packed, backend.as_ref(), &config));
-    let mut error = None;
-    while limits.done(backend.iterations(), start.elapsed(), error) < 1.0
-        && !(interrupt::asked() && backend.iterations() > 0)
-    {
-        let run = backend.iterate()?;
-        // A day's launches are gigabytes.
-        if profiled {
-            profile.add(run);
-        }
-        let iterations = backend.iterations();
-        if ErrorEstimate::is_due(iterations) {
-            let picture = backend.resolve_all()?;
-            error = estimate.relative(iterations, &picture).map(|error| error.total);
-        }
-        progress.show(backend.as_ref(), error);
-    }
-    let seconds = start.elapsed().as_secs_f64();
-    progress.finish();
-
-    let resolved = backend.resolve_all()?;
-    let image = &resolved.image;
-    let estimated = estimate.relative(backend.iterations(), &resolved);
-    let metadata = Metadata {
-        iterations: u64::from(backend.iterations()),
-        photons_emitted: backend.emitted(),
-        seed: u64::from(arguments.seed),
-        device: backend.device().name,
-        seconds,
-        estimated_error: estimated.map(|error| error.total),
+    let work = Work {
+        limits,
+        estimate: ErrorEstimate::new(&config, of_one_photon(&packed, backend.as_ref(), &config)),
+        profiled: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
+        asked: &interrupt::asked,
     };
-    film::write_exr(
-        image,
-        estimate.of_pixels(backend.iterations(), &resolved).as_ref(),
-        &output,
-        &metadata,
-    )?;
-    if let Some(png) = &arguments.png {
-        film::write_png(image, png, arguments.exposure)?;
-    }
-    for warning in backend.counters().warnings(backend.emitted(), config.max_depth) {
+    let progress = Progress::new(limits, quiet);
+    let rendered = work.run(backend.as_mut(), &|backend, error| progress.show(backend, error));
+    progress.finish();
+    let rendered = rendered?;
+    let subject = Subject {
+        scene: scene.name.clone(),
+        resolution: config.resolution,
+        gather: METHODS[gather].name.to_owned(),
+        photons: config.photons,
+        photons_emitted: rendered.emitted,
+        device: backend.device(),
+        counters: backend.counters(),
+    };
+    for warning in backend.counters().warnings(rendered.emitted, config.max_depth) {
         say!("warning: {warning}");
     }
+    write_outputs(arguments, &output, &work.estimate, &rendered, &subject)?;
+    Ok(if interrupt::asked() {
+        Outcome::Interrupted
+    } else {
+        Outcome::Done
+    })
+}
+
+/// Writes all that was asked for, whatever becomes of the others, and says what was rendered.
+///
+/// # Errors
+/// All that failed, the render itself among it, in one line.
+fn write_outputs(
+    arguments: &RenderArguments,
+    output: &Path,
+    estimate: &ErrorEstimate,
+    rendered: &Rendered,
+    subject: &Subject,
+) -> Result<()> {
+    let _writing = Writing::begin();
+    let image = &rendered.picture.image;
+    let error = estimate.relative(rendered.iterations, &rendered.picture);
+    let metadata = Metadata {
+        iterations: u64::from(rendered.iterations),
+        photons_emitted: rendered.emitted,
+        seed: u64::from(arguments.seed),
+        device: subject.device.name.clone(),
+        seconds: rendered.seconds,
+        estimated_error: error.map(|error| error.total),
+    };
+    let errors = estimate.of_pixels(rendered.iterations, &rendered.picture);
+    let mut failures: Vec<String> = rendered.failure.iter().cloned().collect();
+    let mut note = |result: Result<()>| {
+        let is_done = result.is_ok();
+        failures.extend(result.err().map(|error| format!("{error:#}")));
+        is_done
+    };
+    if note(film::write_exr(image, errors.as_ref(), output, &metadata).map_err(Into::into)) {
+        say_rendered(output, rendered, subject, error);
+    }
+    if let Some(png) = &arguments.png {
+        note(film::write_png(image, png, arguments.exposure).map_err(Into::into));
+    }
+    let profile = &rendered.profile;
+    if arguments.profile {
+        note(super::print(&profile.table(subject)).map(|_| ()));
+    }
+    if let Some(file) = &arguments.profile_json {
+        note(write_json(file, &profile.json(subject)));
+    }
+    if let Some(file) = &arguments.trace {
+        note(write_json(file, &profile.trace(subject)));
+    }
+    ensure!(failures.is_empty(), "{}", failures.join("; "));
+    Ok(())
+}
+
+fn say_rendered(output: &Path, rendered: &Rendered, subject: &Subject, error: Option<RelativeError>) {
+    let [width, height] = subject.resolution;
     say!(
-        "{}: {}x{}, {} iterations, {} photon paths ({}), {seconds:.1} s ({} photon paths/s) on {}{}",
+        "{}: {width}x{height}, {} iterations, {} photon paths ({}), {:.1} s ({} photon paths/s) on {}{}",
         output.display(),
-        image.width(),
-        image.height(),
-        backend.iterations(),
-        backend.emitted(),
-        backend.counters().photons(),
-        with_prefix(backend.emitted() as f64 / seconds),
-        backend.device().name,
-        estimated.map_or(String::new(), |error| format!("; {error}")),
+        rendered.iterations,
+        rendered.emitted,
+        subject.counters.photons(),
+        rendered.seconds,
+        with_prefix(rendered.emitted as f64 / rendered.seconds),
+        subject.device.name,
+        error.map_or(String::new(), |error| format!("; {error}")),
     );
-    if let Some(error) = estimated.filter(|error| error.waiting > 0.0) {
+    if let Some(error) = error.filter(|error| error.waiting > 0.0) {
         say!(
             "{:.2} % of the pixels have had no photon yet: of indirect light there the error says only what one photon would \
              bring",
             100.0 * error.waiting
         );
     }
-    let subject = Subject {
-        scene: scene.name.clone(),
-        resolution: config.resolution,
-        gather: METHODS[gather].name.to_owned(),
-        photons: config.photons,
-        device: backend.device(),
-        counters: backend.counters(),
-    };
-    write_profile(arguments, &profile, &subject)?;
-    Ok(if interrupt::asked() {
-        Outcome::Interrupted
-    } else {
-        Outcome::Done
-    })
+}
+
+fn write_json(file: &Path, value: &serde_json::Value) -> Result<()> {
+    Ok(film::write_whole(file, &serde_json::to_vec_pretty(value)?)?)
 }
 
 /// What computes, and the gather method: each follows the other where the user names one alone.
@@ -253,25 +277,4 @@ fn default_output(scene: &Path) -> PathBuf {
 fn outputs<'a>(arguments: &'a RenderArguments, output: &'a Path) -> impl Iterator<Item = &'a Path> {
     let others = [&arguments.png, &arguments.profile_json, &arguments.trace];
     std::iter::once(output).chain(others.into_iter().filter_map(|file| file.as_deref()))
-}
-
-fn write_profile(arguments: &RenderArguments, profile: &Profile, subject: &Subject) -> Result<()> {
-    if arguments.profile {
-        super::print(&profile.table(subject))?;
-    }
-    for (file, value) in [
-        (
-            &arguments.profile_json,
-            arguments.profile_json.as_ref().map(|_| profile.json(subject)),
-        ),
-        (
-            &arguments.trace,
-            arguments.trace.as_ref().map(|_| profile.trace(subject)),
-        ),
-    ] {
-        if let (Some(file), Some(value)) = (file, value) {
-            film::write_whole(file, &serde_json::to_vec_pretty(&value)?)?;
-        }
-    }
-    Ok(())
 }

@@ -23,7 +23,7 @@ use crate::scene::{Camera, PackedScene};
 /// device, so that both give the photons in the same order.
 const LANES: u32 = 4096;
 /// Bytes of a batch's photons at the most.
-const PHOTON_BYTES: u64 = 1 << 30;
+const PHOTON_BYTES: u64 = 1 << 27;
 
 /// A progressive render on the CPU, with all threads of rayon's pool.
 pub struct Renderer {
@@ -216,7 +216,7 @@ impl Renderer {
 }
 
 impl Backend for Renderer {
-    fn iterate(&mut self) -> Result<Run> {
+    fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
         let iteration = self.iterations;
         if self.aim.is_some() && self.config.begins_sequences(iteration) {
             if iteration > 0 {
@@ -243,7 +243,7 @@ impl Backend for Renderer {
         let slots = self.direct_sums.len();
         let sequence = (iteration % SEQUENCES) as usize * slots;
         let sequence = sequence..sequence + slots;
-        let turn = CameraTurn::that_gathers(&self.config, iteration);
+        let mut turn = CameraTurn::that_gathers(&self.config, iteration);
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
             self.seen = clock.time("camera", || camera(&inputs, turn, &counts));
         }
@@ -253,7 +253,18 @@ impl Backend for Renderer {
             demand: demand.as_ref(),
             ..inputs
         };
+        let mut stored = 0;
+        let mut emitted = 0;
         for batch in 0..self.sizes.batches(self.config.photons) {
+            if emitted > 0 && stop() {
+                if iteration > 0 {
+                    self.gathered.fill(Gathered::zeroed());
+                    return Ok(None);
+                }
+                // More camera paths could take longer than what was cut.
+                turn.paths = 1;
+                break;
+            }
             let batch = batch_of(&self.sizes, &self.config, iteration, batch);
             let traced = clock.time("photons", || photons(&inputs, batch, &counts));
             let photons = clock.time("compact", || compact(&traced.lanes));
@@ -267,7 +278,8 @@ impl Backend for Renderer {
                 }
                 _ => clock.time("gather_kd_tree", || gather_kd_tree(seen, &radii2, &photons, gathered))?,
             }
-            self.counters.photons_stored += photons.len() as u64;
+            stored += photons.len() as u64;
+            emitted += batch.paths;
         }
         let sequence = &mut self.sequence_sums[sequence];
         clock.time("direct", || {
@@ -290,7 +302,7 @@ impl Backend for Renderer {
         let gathered_with = GatheredWith {
             radii2: &radii2,
             coverage: &self.coverage,
-            photons: self.config.photons,
+            photons: emitted,
             alpha: self.config.alpha,
         };
         clock.time("update", || {
@@ -315,12 +327,13 @@ impl Backend for Renderer {
         {
             aim.learn(&self.config, iteration, 0, &values);
         }
+        self.counters.photons_stored += stored;
         self.counters.truncated_paths += counts.truncated_paths();
         self.counters.non_finite += counts.non_finite();
         self.counters.photons_landed += counts.landed();
         self.iterations += 1;
-        self.emitted += u64::from(self.config.photons);
-        Ok(clock.run)
+        self.emitted += u64::from(emitted);
+        Ok(Some(clock.run))
     }
 
     fn resolve_all(&mut self) -> Result<Resolved> {

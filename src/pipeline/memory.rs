@@ -30,7 +30,7 @@ impl Memory {
             sizes: &sizes,
             features: scene.features,
         };
-        let recordings = [stages.iteration(0), stages.picture(1, 1)];
+        let recordings = [stages.shortest_iteration(), stages.picture(1, 1)];
         let buffers: BTreeSet<_> = recordings.iter().flat_map(|recording| recording.buffers()).collect();
         let render: u64 = buffers.iter().filter_map(|&id| sizes.bytes(id)).sum();
         let of_maps = [

@@ -1,6 +1,7 @@
 //! A render on a Vulkan device. [`Stages::iteration`] has the order of the stages: it reads like figure 1 of the paper.
 
 mod aim;
+mod iteration;
 mod memory;
 mod radii;
 mod stages;
@@ -15,7 +16,7 @@ use crate::emission::{Aim, is_learned_from};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, default_method, grid_sizes};
 use crate::gpu::Device;
-use crate::layout::{GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, Settings, StatusCounters};
+use crate::layout::{Settings, StatusCounters};
 use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
 use crate::scene::{Camera, PackedScene, SceneFeatures};
@@ -45,9 +46,6 @@ pub struct Renderer {
     /// Launches that a gather outside a render is dealt to, for each of [`METHODS`].
     parts_of_methods: Vec<u32>,
 }
-
-/// How often an iteration is done at the most: every other time halves what its loops have to do.
-const REPEATS: u32 = 24;
 
 impl Renderer {
     /// Prepares a render: uploads the scene, finds the radius, resets the statistics.
@@ -119,7 +117,7 @@ impl Renderer {
         renderer.upload_settings()?;
         // Before any work: memory that lacks is told now and not after an hour.
         let stages = renderer.stages();
-        let (iteration, picture) = (stages.iteration(0), stages.picture(1, 1));
+        let (iteration, picture) = (stages.shortest_iteration(), stages.picture(1, 1));
         renderer.make_buffers(&iteration)?;
         renderer.make_buffers(&picture)?;
         renderer.prepare(scene)?;
@@ -132,59 +130,6 @@ impl Renderer {
             sizes: &self.sizes,
             features: self.features,
         }
-    }
-
-    /// Runs what `record` says; where photons don't fit or loops are cut, makes room and does it again. Returns what all
-    /// of it took, and what the last run reported.
-    fn run_until_it_fits(&mut self, record: impl Fn(Stages<'_>) -> Recording) -> Result<(Run, StatusCounters)> {
-        let mut all = Run::default();
-        for _ in 0..REPEATS {
-            let run = self.run(&record(self.stages()))?;
-            all.launches.extend(run.launches);
-            all.wall += run.wall;
-            let status = self.status()?;
-            if status.again == 0 {
-                self.photon_need = self.photon_need.max([status.lane_need, status.batch_need]);
-                return Ok((all, status));
-            }
-            self.counters.repeated_iterations += 1;
-            self.make_room(&status)?;
-        }
-        Err(Error::Device(format!(
-            "device {} cuts loops however small their parts; use another --device or --backend cpu",
-            self.device.summary().name
-        )))
-    }
-
-    /// After an iteration that has to be done again: sizes that it needs, and what it gathered forgotten.
-    fn make_room(&mut self, status: &StatusCounters) -> Result<()> {
-        // Dealt anew, the lanes' photons are estimated anew.
-        if status.again & LANES_TOO_LONG != 0 {
-            self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
-        } else if status.again & PHOTONS_DID_NOT_FIT != 0 {
-            self.sizes.grow(status.lane_need, status.batch_need);
-        }
-        if status.again & (LANES_TOO_LONG | PHOTONS_DID_NOT_FIT) != 0 {
-            self.sizes.shrink_batch(&self.limits);
-            self.upload_settings()?;
-        }
-        if status.again & GATHERS_TOO_LONG != 0 {
-            self.sizes.gather_parts = self.sizes.gather_parts.saturating_mul(2);
-        }
-        let mut recording = Recording::new();
-        recording.fill(BufferId::GatheredOf, 0);
-        self.run(&recording).map(|_| ())
-    }
-
-    /// Once photons have been traced, makes their buffers as large as those need. Their content is lost.
-    fn fit_photon_buffers(&mut self) -> Result<()> {
-        let [lane_need, batch_need] = self.photon_need;
-        if self.fitted || batch_need == 0 {
-            return Ok(());
-        }
-        self.fitted = true;
-        self.sizes.fit(lane_need, batch_need);
-        self.upload_settings()
     }
 
     /// What the last recording that began with [`reporting`] reported.
@@ -307,12 +252,20 @@ impl Renderer {
 }
 
 impl Backend for Renderer {
-    fn iterate(&mut self) -> Result<Run> {
+    fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
         self.fit_photon_buffers()?;
         let iteration = self.iterations;
         self.begin_block(iteration)?;
-        let (run, status) = self.run_until_it_fits(|stages| stages.iteration(iteration))?;
+        let mut emitted = 0;
+        let (run, status) = self.do_until_it_fits(|renderer, all| {
+            let (status, paths) = renderer.batches(iteration, stop, all)?;
+            emitted = paths;
+            Ok(status)
+        })?;
         let counters = &mut self.counters;
+        if emitted == 0 {
+            return self.forget_gathered().map(|()| None);
+        }
         counters.photons_stored += status.photons_stored();
         counters.truncated_paths += u64::from(status.truncated_paths);
         counters.cut_paths += u64::from(status.cut_paths);
@@ -324,8 +277,8 @@ impl Backend for Renderer {
             self.learn(iteration, self.sizes.batch_paths)?;
         }
         self.iterations += 1;
-        self.emitted += u64::from(self.config.photons);
-        Ok(run)
+        self.emitted += u64::from(emitted);
+        Ok(Some(run))
     }
 
     fn resolve_all(&mut self) -> Result<Resolved> {

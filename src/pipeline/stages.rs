@@ -42,21 +42,50 @@ pub(super) fn reporting() -> Recording {
 impl Stages<'_> {
     /// The commands of an iteration.
     pub fn iteration(&self, iteration: u32) -> Recording {
-        let mut recording = reporting();
-        let (order, gather) = self.method();
+        let mut recording = self.begin(iteration);
+        for batch in 0..self.sizes.batches(self.config.photons) {
+            self.batch(iteration, batch, &mut recording);
+        }
         let turn = CameraTurn::that_gathers(self.config, iteration);
+        self.end(turn, self.config.photons, &mut recording);
+        recording
+    }
+
+    /// The commands of an iteration of one batch: they touch the buffers that one of any number does.
+    pub fn shortest_iteration(&self) -> Recording {
+        let mut recording = self.begin(0);
+        self.batch(0, 0, &mut recording);
+        let turn = CameraTurn::that_gathers(self.config, 0);
+        self.end(turn, self.config.photons, &mut recording);
+        recording
+    }
+
+    /// What comes before an iteration's photons.
+    pub(super) fn begin(&self, iteration: u32) -> Recording {
+        let mut recording = reporting();
+        let (order, _) = self.method();
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
+            let turn = CameraTurn::that_gathers(self.config, iteration);
             self.camera(turn, &mut recording);
             order(self.sizes, &mut recording);
         }
         self.radii(&mut recording);
         self.demand(iteration, &mut recording);
-        for batch in 0..self.sizes.batches(self.config.photons) {
-            self.photons(iteration, batch, &mut recording);
-            gather(self.sizes, &mut recording);
-        }
+        recording
+    }
+
+    /// A batch of an iteration's photons.
+    pub(super) fn batch(&self, iteration: u32, batch: u32, recording: &mut Recording) {
+        let (_, gather) = self.method();
+        self.photons(iteration, batch, recording);
+        gather(self.sizes, recording);
+    }
+
+    /// What comes after an iteration's photons, of so many paths.
+    pub(super) fn end(&self, turn: CameraTurn, photons: u32, recording: &mut Recording) {
+        let iteration = turn.iteration;
         let asks = self.features.dielectric && self.config.asks_behind_glass(iteration);
-        self.direct(turn, asks, &mut recording);
+        self.direct(turn, asks, recording);
         // The paper has no such correction.
         if self.config.estimator == Estimator::Sppm {
             recording.dispatch(
@@ -66,15 +95,14 @@ impl Stages<'_> {
         }
         recording.dispatch(
             StageDesc::new(&shaders::UPDATE, self.sizes.slots())
-                .push([self.config.photons as f32])
+                .push([photons as f32])
                 .bind(vec![sums_of(iteration)]),
         );
         // After the photons: an iteration that has to be done again stops before it has added anything.
         for turn in turn.others() {
-            self.camera(turn, &mut recording);
-            self.direct(turn, false, &mut recording);
+            self.camera(turn, recording);
+            self.direct(turn, false, recording);
         }
-        recording
     }
 
     /// The commands that make the picture, after so many iterations and photon paths.
