@@ -3,7 +3,10 @@
 /// Prints a line to stderr; a stderr that can't be written to is no error.
 macro_rules! say {
     ($($text:tt)*) => {
-        let _ = writeln!(std::io::stderr(), $($text)*);
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("{}\n", $crate::text::escaped(&format!($($text)*))),
+        );
     };
 }
 
@@ -24,6 +27,7 @@ use std::io::Write as _;
 use anyhow::Result;
 use clap::Parser;
 
+use crate::text;
 use args::{Arguments, Command};
 
 /// How a command ended; the process's exit code.
@@ -41,7 +45,7 @@ pub enum Outcome {
 /// The work failed; the error's text is one line.
 pub fn run() -> Result<Outcome> {
     interrupt::survive_file_limits()?;
-    let arguments = Arguments::parse();
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| refuse(&error));
     match arguments.command {
         None => render::render(&arguments.render),
         Some(Command::Devices { json }) => print(&list::devices(json)?),
@@ -55,9 +59,20 @@ pub fn run() -> Result<Outcome> {
     }
 }
 
+/// Ends the process as clap does, but with what a terminal would obey in arguments spelt out.
+fn refuse(error: &clap::Error) -> ! {
+    let text = error.render().to_string();
+    let plain = text::escaped_lines(&text);
+    if plain == text {
+        error.exit();
+    }
+    let _ = write!(std::io::stderr(), "{plain}");
+    std::process::exit(error.exit_code());
+}
+
 /// Prints to stdout; a reader that has seen enough (`| head`) is no error.
 fn print(text: &str) -> Result<Outcome> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match std::io::stdout().lock().write_all(text::escaped_lines(text).as_bytes()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(Outcome::Done),
     }

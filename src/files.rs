@@ -53,7 +53,10 @@ pub fn open(path: &Path) -> Result<File> {
         )
     };
     if !fs::metadata(path).map_err(unopened)?.is_file() {
-        return Err(Error::file(path, "is no regular file: give the path of one"));
+        return Err(Error::file(
+            path,
+            "can't be opened: it is no regular file; give the path of one",
+        ));
     }
     File::open(path).map_err(unopened)
 }
@@ -229,7 +232,7 @@ mod tests {
         }
         for path in paths {
             let error = open(&path).expect_err("no regular file").to_string();
-            assert!(error.contains("is no regular file"), "{error}");
+            assert!(error.contains("it is no regular file"), "{error}");
         }
         let error = open(&folder.path().join("none")).expect_err("no file").to_string();
         assert!(error.contains("can't be opened"), "{error}");

@@ -36,3 +36,4 @@ pub mod report;
 pub mod scene;
 pub mod shaders;
 pub mod stage;
+pub mod text;

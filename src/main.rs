@@ -11,7 +11,8 @@ fn main() -> ExitCode {
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(error) => {
             // A stderr that can't be written to must not change the exit code.
-            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            let line = ppm_vk::text::escaped(&format!("error: {error:#}"));
+            let _ = writeln!(std::io::stderr(), "{line}");
             ExitCode::FAILURE
         }
     }

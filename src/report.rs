@@ -8,6 +8,7 @@ use serde_json::json;
 
 use crate::backend::{Counters, DeviceDescription};
 use crate::record::{Launch, Run};
+use crate::text::escaped;
 
 /// Every launch of a render, in order.
 #[derive(Debug, Default)]
@@ -101,11 +102,11 @@ impl Profile {
         let [width, height] = subject.resolution;
         let mut text = format!(
             "{} at {width}x{height}, {} photon paths an iteration, gather {}\non {} ({}), timestamps of {} ns\n\n",
-            subject.scene,
+            escaped(&subject.scene),
             subject.photons,
             subject.gather,
-            subject.device.name,
-            subject.device.driver,
+            escaped(&subject.device.name),
+            escaped(&subject.device.driver),
             subject.device.timestamp_period_ns
         );
         let mut line = |cells: [&str; 7]| {

@@ -1,6 +1,5 @@
 //! A picture against a reference.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -49,7 +48,8 @@ pub fn run(arguments: &Compare) -> Result<Outcome> {
     for (file, defects) in bad {
         if defects.nan + defects.infinite + defects.negative > 0 {
             say!(
-                "warning: {}: {} pixels with NaN, {} with infinite, {} with negative values",
+                "warning: {}: {} pixels with NaN, {} with infinite, {} with negative values; the measures are of the picture as it \
+                 is, and one such pixel can be all of them",
                 file.display(),
                 defects.nan,
                 defects.infinite,

@@ -1,6 +1,5 @@
 //! Error against time.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};

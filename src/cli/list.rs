@@ -14,6 +14,7 @@ use crate::gather::{METHODS, default_method};
 use crate::gpu;
 use crate::pipeline::Memory;
 use crate::scene::{PackedScene, Scene, Surface};
+use crate::text::escaped;
 
 /// `ppm-vk devices`.
 pub fn devices(as_json: bool) -> Result<String> {
@@ -23,11 +24,12 @@ pub fn devices(as_json: bool) -> Result<String> {
     }
     let mut text = String::new();
     for device in devices {
-        writeln!(text, "{}: {} ({})", device.index, device.name, device.kind)?;
+        writeln!(text, "{}: {} ({})", device.index, escaped(&device.name), device.kind)?;
         writeln!(
             text,
             "   driver           {}, Vulkan {}",
-            device.driver, device.api_version
+            escaped(&device.driver),
+            device.api_version
         )?;
         writeln!(text, "   timestamps       {} ns", device.timestamp_period_ns)?;
         writeln!(text, "   subgroup         {}", device.subgroup_size)?;
@@ -139,7 +141,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
         }
     )?;
     for (index, camera) in scene.cameras.iter().enumerate() {
-        writeln!(text, "camera {index:<5} {}", camera.name)?;
+        writeln!(text, "camera {index:<5} {}", escaped(&camera.name))?;
     }
     let features = packed.features.names();
     writeln!(

@@ -6,6 +6,7 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
 use super::context::{Context, OrVulkan};
 use crate::error::{Error, Result};
+use crate::text;
 
 pub(super) struct Buffer {
     pub handle: vk::Buffer,
@@ -49,8 +50,9 @@ impl Buffer {
                 .map_err(|error| {
                     context.device.destroy_buffer(handle, None);
                     Error::Device(format!(
-                        "no memory for {name} ({} MiB): {error}; try fewer --photons or a smaller --resolution",
-                        bytes >> 20
+                        "no memory for {name}, {} beside what there is already: {error}; try fewer --photons or a smaller \
+                         --resolution",
+                        text::bytes(bytes.max(4))
                     ))
                 })?;
             context

@@ -12,6 +12,7 @@ use super::pipeline_cache::PipelineCache;
 use super::self_check;
 use crate::error::{Error, Result};
 use crate::stage::BufferId;
+use crate::text;
 
 /// Every Vulkan device of this machine.
 ///
@@ -121,10 +122,11 @@ impl Device {
     pub fn create(&mut self, id: BufferId, bytes: u64) -> Result<()> {
         if bytes > self.summary.max_storage_buffer_bytes {
             return Err(Error::Device(format!(
-                "{id:?} needs {} MiB, device {} binds {} MiB at most; try fewer --photons or a smaller --resolution",
-                bytes >> 20,
+                "{id:?} needs {}, device {} binds {} at most; {}",
+                text::bytes(bytes),
                 self.summary.name,
-                self.summary.max_storage_buffer_bytes >> 20
+                text::bytes(self.summary.max_storage_buffer_bytes),
+                advice(id)
             )));
         }
         self.remove(id);
@@ -175,6 +177,26 @@ impl Device {
     /// Bytes of the buffer `id`; 0 if it doesn't exist.
     pub fn size(&self, id: BufferId) -> u64 {
         self.buffers.get(&id).map_or(0, |buffer| buffer.bytes)
+    }
+}
+
+/// What makes a buffer smaller.
+fn advice(id: BufferId) -> &'static str {
+    match id {
+        BufferId::Textures | BufferId::Texels => {
+            "make the scene's textures smaller, or use another --device or --backend cpu"
+        }
+        BufferId::Environment => "make the environment's picture smaller, or use another --device or --backend cpu",
+        BufferId::Bvh
+        | BufferId::HavelTriangles
+        | BufferId::ShadingTriangles
+        | BufferId::Instances
+        | BufferId::Materials
+        | BufferId::Corners
+        | BufferId::Lights
+        | BufferId::NearLights
+        | BufferId::ObjectGrids => "make the scene smaller, or use another --device or --backend cpu",
+        _ => "try fewer --photons or a smaller --resolution",
     }
 }
 

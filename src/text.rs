@@ -1,0 +1,69 @@
+//! Text as people read it.
+
+use std::fmt::Write as _;
+
+/// `text` with what would move a terminal's cursor, change its state or turn the direction of writing as `\u001b` and the like, as
+/// in JSON. Names in files may have such characters, and names of files, and of devices.
+pub fn escaped(text: &str) -> String {
+    escape(text, false)
+}
+
+/// The same, but lines end where they end.
+pub fn escaped_lines(text: &str) -> String {
+    escape(text, true)
+}
+
+fn escape(text: &str, keeps_lines: bool) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        if (character == '\n' && keeps_lines) || !is_hidden(character) {
+            escaped.push(character);
+        } else {
+            // All of them have 16 bits, and writing to a String can't fail.
+            let _ = write!(escaped, "\\u{:04x}", u32::from(character));
+        }
+    }
+    escaped
+}
+
+/// Controls of C0 and C1, line and paragraph separators, and Unicode's marks, embeddings, overrides and isolates of directions.
+fn is_hidden(character: char) -> bool {
+    character.is_control()
+        || matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// A number of bytes with three digits or so: one that isn't 0 isn't told as 0.
+pub fn bytes(count: u64) -> String {
+    match count {
+        0..1024 => format!("{count} bytes"),
+        1024..0x10_0000 => format!("{:.1} KiB", count as f64 / 1024.0),
+        0x10_0000..0x4000_0000 => format!("{:.1} MiB", count as f64 / f64::from(1 << 20)),
+        _ => format!("{:.1} GiB", count as f64 / f64::from(1 << 30)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_terminals_obey_is_spelt_out() {
+        let name = "a\u{1b}[31m\r\n\u{9b}2J\u{202e}b\u{2066}\u{7f}";
+        assert_eq!(escaped(name), r"a\u001b[31m\u000d\u000a\u009b2J\u202eb\u2066\u007f");
+        assert_eq!(escaped_lines("a\nb\tc"), "a\nb\\u0009c");
+        let plain = "Tür «1» 日本 🙂 👩‍🚀";
+        assert_eq!(escaped(plain), plain);
+        // JSON stays JSON.
+        let json = escaped_lines("{\n\"name\": \"\u{202e}\"}");
+        assert!(serde_json::from_str::<serde_json::Value>(&json).is_ok_and(|value| value["name"] == "\u{202e}"));
+    }
+
+    #[test]
+    fn no_number_of_bytes_is_told_as_none() {
+        let texts = [1, 1023, 1024, 300_000, 3 << 19, 5 << 30].map(bytes);
+        assert_eq!(
+            texts,
+            ["1 bytes", "1023 bytes", "1.0 KiB", "293.0 KiB", "1.5 MiB", "5.0 GiB"]
+        );
+    }
+}
