@@ -207,15 +207,16 @@ pub fn positive(text: &str) -> Result<f64, String> {
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {
-        Err("must be above 0".to_owned())
+        Err("must be above 0 and finite".to_owned())
     }
 }
 
 pub fn seconds(text: &str) -> Result<Duration, String> {
-    match Duration::try_from_secs_f64(number(text)?) {
+    let seconds = positive(text)?;
+    match Duration::try_from_secs_f64(seconds) {
         Ok(time) if !time.is_zero() => Ok(time),
-        Ok(_) => Err("must be above 0".to_owned()),
-        Err(error) => Err(error.to_string()),
+        Ok(_) => Err("must be a nanosecond or more".to_owned()),
+        Err(_) => Err("is more than can be counted; leave it out for no limit".to_owned()),
     }
 }
 

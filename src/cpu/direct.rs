@@ -69,7 +69,8 @@ pub fn direct<'a>(
             }
         }
         radiance /= f64::from(turn.paths);
-        if radiance.is_finite() {
+        // As a device has it.
+        if radiance.as_vec3().is_finite() {
             let (unbent_before, asked_before) = (sum.high[3], sum.low[3]);
             (sum.high, sum.low) = to_two_floats(from_two_floats(sum.high, sum.low) + radiance.extend(0.0));
             sum.high[3] = unbent_before + unbent as f32;

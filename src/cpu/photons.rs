@@ -144,7 +144,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         let mut landing = path.flux;
         if mixed || wide_coat || scatters(&material) {
             landing *= facing.landing_correction(incoming);
-            if !landing.is_finite() {
+            if !landing.as_vec3().is_finite() {
                 counts.add_non_finite(1);
                 return value;
             }

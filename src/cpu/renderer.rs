@@ -339,7 +339,7 @@ impl Backend for Renderer {
     fn resolve_all(&mut self) -> Result<Resolved> {
         self.counters.photons_accepted = self.statistics.iter().map(Statistics::accepted).sum();
         let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
-        let (film, behind_glass) = resolve(
+        let (film, behind_glass, non_finite) = resolve(
             &self.settings,
             &self.seen.points,
             &self.statistics,
@@ -348,6 +348,7 @@ impl Backend for Renderer {
             iterations,
             emitted,
         );
+        self.counters.non_finite += non_finite;
         let sequences = resolve_sequences(&self.settings, &self.sequence_sums, iterations);
         Ok(Resolved::from_film(
             self.config.resolution,

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use bytemuck::Zeroable;
-use glam::{DVec3, DVec4};
+use glam::{DVec3, DVec4, Vec4};
 
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{from_two_float, from_two_floats, word, xyz};
@@ -32,8 +32,9 @@ pub fn resolve_sequences(settings: &Settings, sums: &[[f32; 4]], iterations: u32
             if let Some([x, y]) = pixel_of(settings.resolution, pixel_slot) {
                 let sum: DVec4 = slots.iter().map(|sum| DVec4::from(sum.map(f64::from))).sum();
                 let mean = sum / iterations.max(1.0);
+                let mean = mean.as_vec4();
                 if mean.is_finite() {
-                    picture[y as usize * width + x as usize] = mean.as_vec4().to_array();
+                    picture[y as usize * width + x as usize] = mean.to_array();
                 }
             }
         }
@@ -63,7 +64,8 @@ fn pixel_width(settings: &Settings, position: DVec3) -> f64 {
 
 /// The picture, RGB and curvature (infinite where no photon has come to a surface that isn't in the open), row by row from
 /// the top left: eq. 4 for each slot of a pixel and photon map, and the mean over the iterations of what was seen directly.
-/// And what tells how much light behind glass no photon has brought yet. `emitted` are the photon paths of all iterations.
+/// What tells how much light behind glass no photon has brought yet. The number of pixels whose radiance isn't finite, and which
+/// are black. `emitted` are the photon paths of all iterations.
 pub fn resolve(
     settings: &Settings,
     points: &[VisiblePoint],
@@ -72,10 +74,11 @@ pub fn resolve(
     coverage: &[Coverage],
     iterations: u32,
     emitted: u64,
-) -> (Vec<[f32; 4]>, Vec<BehindGlass>) {
+) -> (Vec<[f32; 4]>, Vec<BehindGlass>, u64) {
     let [width, height] = settings.resolution.map(|side| side as usize);
     let slots_per_pixel = settings.slots_per_pixel as usize;
     let mut film = vec![[0.0; 4]; width * height];
+    let mut non_finite = 0;
     let mut glass_film = vec![BehindGlass::zeroed(); width * height];
     for pixel_slot in 0..pixel_slots(settings) {
         let Some([x, y]) = pixel_of(settings.resolution, pixel_slot as u32) else {
@@ -121,12 +124,17 @@ pub fn resolve(
             }
         }
         (glass.unbent, glass.arrived) = (unbent as f32, arrived as f32);
+        let mut radiance = radiance.as_vec4();
+        if !radiance.is_finite() {
+            non_finite += 1;
+            radiance = Vec4::ZERO;
+        }
         if has_surface && !has_photons {
-            radiance.w = f64::INFINITY;
+            radiance.w = f32::INFINITY;
         }
         let pixel = y as usize * width + x as usize;
-        film[pixel] = radiance.as_vec4().to_array();
+        film[pixel] = radiance.to_array();
         glass_film[pixel] = glass;
     }
-    (film, glass_film)
+    (film, glass_film, non_finite)
 }

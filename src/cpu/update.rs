@@ -120,7 +120,7 @@ pub fn update(
             let flux = (weight * xyz(gathered.flux_count)).extend(curvature) * larger;
             let new_photons = word(gathered.flux_count);
             *gathered = Gathered::zeroed();
-            if !flux.is_finite() {
+            if !flux.as_vec4().is_finite() {
                 counts.add_non_finite(1);
             } else if new_photons > 0 {
                 let area = PI * f64::from(statistics.radius2_high) * share_of(coverage);

@@ -18,6 +18,16 @@ const FRAMED_FOV: f64 = 40.0 * PI / 180.0;
 /// How far that camera looks down, in radians.
 const FRAMED_PITCH: f64 = 15.0 * PI / 180.0;
 
+/// Radius of a lens at the most, in render units, of which the scene has about one: far more than a blur that shows anything.
+const LARGEST_LENS: f64 = 100.0;
+
+/// Radius of a lens over its distance to what is in focus at the most: its rays would be nearly perpendicular to its axis.
+const WIDEST_LENS: f64 = 100.0;
+
+/// Distances of what is sharp, in render units: nothing nearer is seen, and what is farther is as sharp as what is there.
+const NEAREST_FOCUS: f32 = 1e-9;
+const FARTHEST_FOCUS: f32 = 1e9;
+
 /// Free space around the bounds in its picture, as a factor of its distance.
 const FRAMED_MARGIN: f64 = 1.05;
 
@@ -188,8 +198,21 @@ impl Scene {
         let (lower, upper) = self.bounds();
         let centre = 0.5 * (lower + upper);
         let focus = focus.map_or((centre - camera.position).dot(camera.forward), |focus| {
-            (focus * scale) as f32
+            ((focus * scale) as f32).clamp(NEAREST_FOCUS, FARTHEST_FOCUS)
         });
+        if radius * scale > LARGEST_LENS {
+            return Err(Error::Config(format!(
+                "--aperture {radius:e}: all would be blurred to nothing; a lens has a radius of {:.3} scene units at the most here",
+                LARGEST_LENS / scale
+            )));
+        }
+        if focus > 0.0 && radius * scale > WIDEST_LENS * f64::from(focus) {
+            return Err(Error::Config(format!(
+                "--aperture {radius:e} with things in focus at {:e}: the lens is too wide to see anything by; make it smaller, or move \
+                 the focus away by --focus",
+                f64::from(focus) / scale
+            )));
+        }
         if focus > 0.0 && focus.is_finite() {
             Ok(Lens {
                 radius: (radius * scale) as f32,

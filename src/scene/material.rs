@@ -112,13 +112,13 @@ impl Reader<'_> {
         let [transmission] = self.fractions("transmissionFactor", [transmission])?;
         let ior = self.ior()?;
         let (specular, specular_color) = self.specular()?;
-        self.check_volume()?;
+        let attenuation_color = self.attenuation_color()?;
 
         // A texture may make less of a factor, and other things from place to place.
         let textured = pbr.metallic_roughness_texture.is_some();
         let all_metal = metallic == 1.0 && !textured;
         if all_metal && transmission > 0.0 {
-            self.warn("metallicFactor 1 leaves nothing of its transmission; set it to 0 for glass".into());
+            self.warn("metallicFactor 1 leaves nothing of its transmission, and it is rendered as metal; set it to 0 for glass".into());
         }
         if all_metal && roughness == 0.0 {
             return Ok(Surface::Mirror);
@@ -148,7 +148,9 @@ impl Reader<'_> {
             transmission,
             gloss,
             thin,
-            absorption: volume.filter(|_| !thin).map_or(Vec3::ZERO, absorption),
+            absorption: volume
+                .filter(|_| !thin)
+                .map_or(Vec3::ZERO, |volume| absorption(attenuation_color, volume)),
             // A thin wall doesn't bend light.
             dispersion: if thin { 0.0 } else { self.dispersion()? },
         }))
@@ -210,20 +212,21 @@ impl Reader<'_> {
         Ok((factor, not_negative("specularColorFactor", color)?.into()))
     }
 
-    fn check_volume(&mut self) -> Check<()> {
+    /// Of KHR_materials_volume, whose other values are checked.
+    fn attenuation_color(&mut self) -> Check<Vec3> {
         let Some(volume) = self.extension(|extensions| extensions.volume.as_ref()) else {
-            return Ok(());
+            return Ok(Vec3::ONE);
         };
         let (color, distance) = (volume.attenuation_color.0, volume.attenuation_distance.0);
         not_negative("thicknessFactor", [volume.thickness_factor.0])?;
-        self.fractions("attenuationColor", color)?;
+        let color = self.fractions("attenuationColor", color)?;
         // Infinity is the default.
         if distance.is_nan() || distance <= 0.0 {
             return Err(format!(
                 "its attenuationDistance is {distance}, but it must be positive; correct it in the file"
             ));
         }
-        Ok(())
+        Ok(color.into())
     }
 
     /// The textures. Not the thickness's: it is for renderers that don't trace through the solid.
@@ -300,7 +303,10 @@ impl Reader<'_> {
     fn fractions<const N: usize>(&mut self, what: &str, values: [f32; N]) -> Check<[f32; N]> {
         let values = not_negative(what, values)?;
         if values.iter().any(|&value| value > 1.0) {
-            self.warn(format!("{what} {} is above 1 and cut to it", spell(&values)));
+            self.warn(format!(
+                "{what} {} is above 1, which would make light out of nothing, and cut to it; correct it in the file",
+                spell(&values)
+            ));
         }
         Ok(values.map(|value| value.min(1.0)))
     }
@@ -347,10 +353,10 @@ fn used(info: &Info, srgb: bool) -> TextureUse {
 }
 
 /// Beer's absorption coefficient: light keeps attenuationColor over attenuationDistance. 1/scene unit.
-fn absorption(volume: &Volume) -> Vec3 {
+fn absorption(color: Vec3, volume: &Volume) -> Vec3 {
     // A black channel keeps next to nothing, and no infinity gets into the kernels.
     const DARKEST: f32 = 1e-10;
-    let color = Vec3::from(volume.attenuation_color.0).max(Vec3::splat(DARKEST));
+    let color = color.max(Vec3::splat(DARKEST));
     -color.map(f32::ln) / volume.attenuation_distance.0
 }
 

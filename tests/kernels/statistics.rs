@@ -337,7 +337,7 @@ fn pictures_are_resolved_by_equation_4() {
         let (iterations, emitted) = (bench.renderer.iterations(), bench.renderer.emitted());
         let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
         let resolved = bench.renderer.resolve_all().expect("a picture");
-        let (expected, behind_glass) = cpu::resolve(
+        let (expected, behind_glass, _) = cpu::resolve(
             &bench.settings,
             &points,
             &statistics,

@@ -105,6 +105,23 @@ fn unnamed_materials_are_numbered_and_the_default_material_is_appended() {
     assert_eq!(scene.materials[2].base_color.to_array(), [1.0; 3]);
 }
 
+/// An attenuationColor above 1 would amplify light.
+#[test]
+fn a_volume_amplifies_no_light() {
+    let glass = |color: Value| {
+        matte(json!({
+            "pbrMetallicRoughness": {"metallicFactor": 0},
+            "extensions": {
+                "KHR_materials_transmission": {"transmissionFactor": 1},
+                "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 0.5, "attenuationColor": color}
+            }
+        }))
+    };
+    let clear = floor_of(glass(json!([1, 0.5, 0.25]))).scene();
+    let cut = floor_of(glass(json!([5123, 0.5, 0.25]))).assert_warns(&["attenuationColor 5123 0.5 0.25", "above 1"]);
+    assert_eq!(cut.materials[0].surface, clear.materials[0].surface);
+}
+
 #[test]
 fn factors_above_1_are_cut_with_a_warning() {
     let pbr = json!({"metallicFactor": 0, "baseColorFactor": [0.5, 1.5, 2, 1]});
