@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 
-use super::args::number;
+use super::args::{number, positive};
 use super::progress::{READING, while_showing};
 use crate::scene::{Environment, LoadOptions, Scene};
 
@@ -19,6 +19,10 @@ pub struct SceneArguments {
     /// Apply the scene's animations at this time, in seconds [default: everything at rest].
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = frame_time)]
     frame_time: Option<f64>,
+    /// Memory that the scene may take as it is read: buffers, images, geometry. A small file can ask for any amount
+    /// [default: 2].
+    #[arg(long, value_name = "GIB", allow_negative_numbers = true, value_parser = positive)]
+    memory_limit: Option<f64>,
 }
 
 /// What `--environment` asks for.
@@ -50,6 +54,9 @@ impl SceneArguments {
         let options = LoadOptions {
             frame_time: self.frame_time,
             environment,
+            memory_limit: self
+                .memory_limit
+                .map(|gibibytes| (gibibytes * f64::from(1 << 30)) as u64),
         };
         Ok(while_showing(READING, quiet, || Scene::load_with(path, options))?)
     }

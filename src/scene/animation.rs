@@ -98,7 +98,8 @@ impl<'a> Pose<'a> {
         };
         if node.matrix.is_some() && property != Property::MorphTargetWeights {
             warnings.push(format!(
-                "{}: it has a matrix, which animations can't move; it stays where it is",
+                "{}: it has a matrix, which animations can't move; it stays where it is at rest: export translation, rotation and scale \
+                 instead",
                 node_label(root, index)
             ));
             return Ok(None);

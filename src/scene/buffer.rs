@@ -9,6 +9,7 @@ use base64::engine::DecodePaddingMode;
 use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::{Buffer, Root};
 
+use super::budget::Budget;
 use super::diagnostic::{Check, damaged, label, quote};
 use super::meshopt;
 
@@ -20,20 +21,14 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// The most that all buffers of a scene may hold, in bytes: a small file can name a large one a thousand times.
-pub(super) const MAX_TOTAL_SIZE: u64 = 1 << 33;
-
 /// Reads each buffer of `root`. `folder` holds the scene file, `binary` is the binary chunk of a `.glb`.
-pub(super) fn read_all(root: &Root, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<Vec<u8>>> {
+pub(super) fn read_all(root: &Root, folder: &Path, binary: Option<Vec<u8>>, budget: &Budget) -> Check<Vec<Vec<u8>>> {
+    // Before any is read: a small file can name a large one a thousand times.
     let total = root
         .buffers
         .iter()
         .fold(0u64, |total, buffer| total.saturating_add(buffer.byte_length.0));
-    if total > MAX_TOTAL_SIZE {
-        return Err(format!(
-            "its buffers have {total} bytes, more than the {MAX_TOTAL_SIZE} that are read; split the scene"
-        ));
-    }
+    budget.take(total, "what its buffers hold")?;
     let mut binary = binary;
     let mut buffers = Vec::with_capacity(root.buffers.len());
     for (index, buffer) in root.buffers.iter().enumerate() {
@@ -75,13 +70,25 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8
     Ok(bytes)
 }
 
-/// The bytes that the uri of an image stands for.
-pub(super) fn read_uri(uri: &str, folder: &Path) -> Check<Vec<u8>> {
-    match data_of(uri) {
-        Some(data) => decode_data_uri(data),
-        None => read_file(&folder.join(relative_path(uri)?), MAX_TOTAL_SIZE),
+/// The bytes that the uri of an image stands for. Of a file as many as `needed` says after a look at its first ones: what follows
+/// may have no end.
+pub(super) fn read_uri(uri: &str, folder: &Path, needed: impl FnOnce(&[u8]) -> u64, budget: &Budget) -> Check<Vec<u8>> {
+    if let Some(data) = data_of(uri) {
+        return decode_data_uri(data);
     }
+    let path = folder.join(relative_path(uri)?);
+    let head = read_file(&path, HEAD)?;
+    if (head.len() as u64) < HEAD {
+        return Ok(head);
+    }
+    let length = fs::metadata(&path).map_or(u64::MAX, |metadata| metadata.len());
+    let length = length.min(needed(&head));
+    budget.check(length, format_args!("the file {}", quote(uri)))?;
+    read_file(&path, length)
 }
+
+/// Bytes that a file of an image is looked at first.
+const HEAD: u64 = 1 << 20;
 
 /// The files that buffers and images refer to, whether they are read or not.
 pub(super) fn referred_files<'a>(root: &'a Root, folder: &'a Path) -> impl Iterator<Item = PathBuf> + 'a {

@@ -72,6 +72,32 @@ impl Builder {
         }
     }
 
+    /// Bytes of what there is, and of an instance beside it at the least.
+    pub(super) fn bytes_with(&self, instance: &Instance<'_>) -> u64 {
+        let Geometry {
+            positions,
+            normals,
+            texcoords,
+            colors,
+            tangents,
+            triangles,
+            ..
+        } = &self.geometry;
+        let sizes = [
+            size_of_val(&positions[..]) + size_of_val(&normals[..]),
+            size_of_val(&texcoords[..]) + size_of_val(&colors[..]) + size_of_val(&tangents[..]),
+            size_of_val(&triangles[..]),
+        ];
+        let more = if self.shared.contains_key(&instance.key()) {
+            0
+        } else {
+            let (vertices, triangles) = (instance.primitive.attributes.len(), instance.primitive.triangle_count());
+            let used = vertices.min(3 * triangles);
+            size_of::<u32>() * vertices + 2 * size_of::<Vec3>() * used + size_of::<Triangle>() * triangles
+        };
+        (sizes.iter().sum::<usize>() + more) as u64
+    }
+
     /// Adds an instance as an object, unless nothing of it is left. Returns how many triangles were dropped.
     pub(super) fn add(&mut self, root: &Root, instance: &Instance<'_>) -> Check<usize> {
         let object = |triangles, placement| Object {

@@ -11,6 +11,7 @@ use gltf::json::Root;
 use gltf::json::buffer::View;
 use serde_json::Value;
 
+use super::budget::Budget;
 use super::buffer::{self, slice};
 use super::diagnostic::{Check, Warnings, damaged, quote};
 use super::{coat, glb, json, meshopt};
@@ -45,20 +46,24 @@ pub(super) struct Document {
     decoded_views: HashMap<usize, Vec<u8>>,
     /// Whether the file uses [`QUANTIZATION`].
     pub is_quantized: bool,
+    /// What memory there is for the rest of the scene.
+    pub budget: Budget,
 }
 
 /// Allows attributes to be stored as small integers.
 const QUANTIZATION: &str = "KHR_mesh_quantization";
 
 impl Document {
-    /// Reads the file at `path` and all buffers that it refers to.
-    pub(super) fn read(path: &Path, warnings: &mut Warnings) -> Check<Self> {
-        let mut bytes = read_file(path)?;
+    /// Reads the file at `path` and all buffers that it refers to, for a scene that may take so many bytes.
+    pub(super) fn read(path: &Path, memory_limit: u64, warnings: &mut Warnings) -> Check<Self> {
+        let budget = Budget::new(memory_limit);
+        let mut bytes = read_file(path, &budget)?;
         let (json, binary) = if bytes.starts_with(glb::MAGIC) {
             glb::split(&bytes)?
         } else {
             (0..bytes.len(), None)
         };
+        json::check_size(&bytes[json.clone()], &budget)?;
         let root = parse(&bytes[json], warnings)?;
         // The binary chunk can be most of the file: shrink to it instead of copying.
         let binary = binary.map(|chunk| {
@@ -67,8 +72,8 @@ impl Document {
             bytes
         });
         let folder = path.parent().unwrap_or(Path::new(""));
-        let buffers = buffer::read_all(&root, folder, binary)?;
-        let decoded_views = meshopt::decode_views(&root, &buffers)?;
+        let buffers = buffer::read_all(&root, folder, binary, &budget)?;
+        let decoded_views = meshopt::decode_views(&root, &buffers, &budget)?;
         let mut extensions = root.extensions_used.iter().chain(&root.extensions_required);
         let is_quantized = extensions.any(|extension| extension == QUANTIZATION);
         Ok(Self {
@@ -76,6 +81,7 @@ impl Document {
             buffers,
             decoded_views,
             is_quantized,
+            budget,
         })
     }
 
@@ -100,7 +106,7 @@ impl Document {
     }
 }
 
-fn read_file(path: &Path) -> Check<Vec<u8>> {
+fn read_file(path: &Path, budget: &Budget) -> Check<Vec<u8>> {
     let unreadable = |error| format!("can't be read ({error}); check the path and its permissions");
     let metadata = fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
@@ -112,6 +118,7 @@ fn read_file(path: &Path) -> Check<Vec<u8>> {
             metadata.len()
         ));
     }
+    budget.check(metadata.len(), "the file itself")?;
     let bytes = fs::read(path).map_err(unreadable)?;
     if bytes.is_empty() {
         return Err("is empty; export the scene again".into());

@@ -83,7 +83,8 @@ impl Environment {
         let mut warnings = Vec::new();
         if self.replaced > 0 {
             warnings.push(format!(
-                "{} values of the environment are negative, infinite or NaN, and are taken for 0",
+                "{} values of the environment are negative, infinite or NaN, and are taken for 0: where they are infinite, as a sun \
+                 that half floats don't hold, that light is missing; export it as 32-bit floats",
                 self.replaced
             ));
         }
@@ -91,7 +92,7 @@ impl Environment {
             let [to_width, to_height] = self.size();
             warnings.push(format!(
                 "the environment of {width}x{height} pixels is larger than what devices hold, and is reduced to \
-                 {to_width}x{to_height}"
+                 {to_width}x{to_height}: its light stays, but it is seen less sharp"
             ));
         }
         warnings

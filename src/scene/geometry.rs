@@ -87,7 +87,7 @@ pub(super) fn instances<'a>(
             if placed.node.skin.is_some() && !attributes.is_skinned() {
                 let label = primitive_label(mesh_index, mesh, primitive_index);
                 warnings.push(format!(
-                    "{label}: it has no joints and weights to follow a skin by; it follows its node"
+                    "{label}: it has no joints and weights to follow a skin by; it follows its node, and may be misplaced"
                 ));
             }
             let targets = attributes.morph_target_count();
@@ -116,11 +116,15 @@ pub(super) fn instances<'a>(
 }
 
 /// Builds the triangles of all instances in render space, without those that have no area.
-pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut Warnings) -> Check<Geometry> {
+pub(super) fn assemble(document: &Document, instances: &[Instance<'_>], warnings: &mut Warnings) -> Check<Geometry> {
+    let root = &document.root;
     let normalisation = normalise(root, instances)?;
     let mut builder = Builder::new(normalisation, sharing::is_worth_it(root, instances));
     let mut dropped = Vec::new();
     for instance in instances {
+        document
+            .budget
+            .check(builder.bytes_with(instance), instance.label(root))?;
         let count = builder
             .add(root, instance)
             .map_err(|what| format!("{}: {what}", instance.label(root)))?;
@@ -139,20 +143,22 @@ pub(super) fn assemble(root: &Root, instances: &[Instance<'_>], warnings: &mut W
     }
     if !dropped.is_empty() {
         warnings.push(format!(
-            "dropped {} triangles of zero area, in {}",
+            "dropped {} triangles of zero area, in {}; no ray could meet them, and nothing is missing",
             geometry.dropped_triangles,
             list(&dropped)
         ));
     }
     if builder.zero_normals > 0 {
         warnings.push(format!(
-            "{} vertices have a normal of zero length; a triangle's own is used instead",
+            "{} vertices have a normal of zero length; a triangle's own is used instead, so that edges may show there: recompute \
+             normals",
             builder.zero_normals
         ));
     }
     if builder.not_finite > 0 {
         warnings.push(format!(
-            "{} texture coordinates, colours or tangents of vertices aren't finite and are left out",
+            "{} texture coordinates, colours or tangents of vertices aren't finite and are taken for 0, so that surfaces there may \
+             have a wrong colour: export the file again",
             builder.not_finite
         ));
     }

@@ -6,14 +6,28 @@ use std::path::Path;
 use gltf::json;
 use image::{ImageFormat, ImageReader, Limits};
 
+use super::budget::Budget;
 use super::buffer::read_uri;
 use super::diagnostic::{Check, damaged};
 use super::document::Document;
 
 /// Longest side of an image, in texels: sides are stored as 16 bits.
 const LONGEST_SIDE: u32 = 32_768;
+/// What a file may hold beside its pixels: profiles, comments, previews.
+const BESIDE_PIXELS: u64 = 64 << 20;
 /// What decoding may take beside the result, in bytes for each texel: 16-bit channels, and rows of filters.
 const MEMORY_A_TEXEL: u64 = 16;
+
+/// What decoding takes in fact: the pixels as the file has them, and a copy.
+const DECODING_A_TEXEL: u64 = 8;
+
+/// Bytes at the most of a file that begins like this and holds one picture.
+fn most_bytes(head: &[u8]) -> u64 {
+    let reader = ImageReader::new(Cursor::new(head)).with_guessed_format();
+    let size = reader.ok().and_then(|reader| reader.into_dimensions().ok());
+    let pixels = size.map_or(u64::MAX, |(width, height)| u64::from(width) * u64::from(height));
+    pixels.saturating_mul(MEMORY_A_TEXEL).saturating_add(BESIDE_PIXELS)
+}
 
 /// Pixels of an image, RGBA, as the file has them, in rows from the top left. What has more than 8 bits is rounded to them.
 pub(super) struct Pixels {
@@ -23,10 +37,11 @@ pub(super) struct Pixels {
 }
 
 impl Pixels {
-    /// Reads an image of `document`, whose file is in `folder`, of so many texels at the most.
-    pub(super) fn read(document: &Document, image: &json::Image, folder: &Path, most: u64) -> Check<Self> {
+    /// Reads an image of `document`, whose file is in `folder`.
+    pub(super) fn read(document: &Document, image: &json::Image, folder: &Path) -> Check<Self> {
+        let budget = &document.budget;
         match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => Self::decode(&read_uri(uri, folder)?, most),
+            (Some(uri), _) => Self::decode(&read_uri(uri, folder, most_bytes, budget)?, budget),
             (None, Some(view)) => {
                 let views = &document.root.buffer_views;
                 let json = views.get(view.value()).ok_or_else(|| {
@@ -35,13 +50,13 @@ impl Pixels {
                         views.len()
                     ))
                 })?;
-                Self::decode(document.view_bytes(view.value(), json)?, most)
+                Self::decode(document.view_bytes(view.value(), json)?, budget)
             }
             (None, None) => Err(damaged("it has neither a uri nor a bufferView")),
         }
     }
 
-    fn decode(bytes: &[u8], most: u64) -> Check<Self> {
+    fn decode(bytes: &[u8], budget: &Budget) -> Check<Self> {
         let unreadable = |error| format!("it can't be decoded ({error}); export it as PNG or JPEG");
         let format = match image::guess_format(bytes) {
             Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
@@ -52,12 +67,15 @@ impl Pixels {
         // A few bytes can claim to be any number of texels: ask before there is memory for them.
         let (width, height) = reader().into_dimensions().map_err(unreadable)?;
         let texels = u64::from(width) * u64::from(height);
-        if width.max(height) > LONGEST_SIDE || texels > most {
+        if width.max(height) > LONGEST_SIDE {
             return Err(format!(
-                "it has {width}x{height} texels, more than are read, {LONGEST_SIDE} along a side and {most} of what is left of \
-                 all images'; make it smaller"
+                "it has {width}x{height} texels, more than the {LONGEST_SIDE} along a side that are read; make it smaller"
             ));
         }
+        let kept = size_of::<u32>() as u64 * texels;
+        let what = format!("an image of {width}x{height} texels");
+        budget.check(kept + DECODING_A_TEXEL * texels, &what)?;
+        budget.take(kept, &what)?;
         let mut limits = Limits::default();
         limits.max_alloc = Some(MEMORY_A_TEXEL * texels + (1 << 20));
         let mut reader = reader();

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use gltf::json::Root;
 use serde_json::{Number, Value};
 
+use super::budget::Budget;
 use super::diagnostic::{Check, Warnings, damaged, quote};
 
 /// Component types of accessors.
@@ -13,6 +14,15 @@ const U16: u64 = 5123;
 
 /// Integers from here on aren't exact as floating-point numbers.
 const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
+
+/// Checks that there is memory for JSON, before it is read: values take much more than their text.
+pub(super) fn check_size(json: &[u8], budget: &Budget) -> Check<()> {
+    /// Of a value as such and of a member of a struct of the `gltf` crate, about.
+    const BYTES_A_VALUE: u64 = 128;
+    let values = json.iter().filter(|byte| b",[{".contains(byte)).count() as u64;
+    // Texts are copied twice.
+    budget.check(BYTES_A_VALUE * values + 2 * json.len() as u64, "its JSON")
+}
 
 /// Reads JSON, and writes alike what the schema allows to be written in several ways: members that are null are as good as
 /// absent, `extras` may be anything and are read by nobody, and integers may have a fraction of zero. Warns of what the format

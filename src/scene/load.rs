@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::animation::Pose;
+use super::budget::MEMORY_LIMIT;
 use super::buffer::referred_files;
 use super::diagnostic::{Check, Warnings, quote};
 use super::document::{Document, SUPPORTED_EXTENSIONS};
@@ -22,6 +23,8 @@ pub struct LoadOptions {
     pub frame_time: Option<f64>,
     /// What surrounds the scene. `None`: nothing, or white light where the scene has no light at all, which is said.
     pub environment: Option<Environment>,
+    /// Bytes that the scene may take as it is read: buffers, images, geometry. `None`: [`MEMORY_LIMIT`].
+    pub memory_limit: Option<u64>,
 }
 
 impl Scene {
@@ -49,7 +52,7 @@ impl Scene {
 
 fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     let mut warnings = Warnings::default();
-    let document = Document::read(path, &mut warnings)?;
+    let document = Document::read(path, options.memory_limit.unwrap_or(MEMORY_LIMIT), &mut warnings)?;
     let root = &document.root;
     let pose = match options.frame_time {
         Some(time) => Pose::at(&document, time, &mut warnings)?,
@@ -59,7 +62,7 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     warn_of_ignored(&document, &options, &mut warnings);
 
     let instances = geometry::instances(&document, &nodes, &pose, &mut warnings)?;
-    let geometry = geometry::assemble(root, &instances, &mut warnings)?;
+    let geometry = geometry::assemble(&document, &instances, &mut warnings)?;
 
     let mut used = vec![false; root.materials.len() + 1];
     for object in &geometry.objects {
@@ -68,6 +71,7 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut textures = TextureReader::new(&document, folder);
     let mut materials = material::materials(root, &used, &mut textures, &mut warnings)?;
+    document.budget.settle()?;
     if used.last() == Some(&false) {
         materials.pop();
     }
@@ -122,14 +126,15 @@ fn warn_of_ignored(document: &Document, options: &LoadOptions, warnings: &mut Wa
     for extension in &root.extensions_used {
         if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) {
             warnings.push(format!(
-                "the extension {} isn't supported and is ignored",
+                "the extension {} isn't supported and is ignored, so that what it describes looks as it does without it, as in other \
+                 viewers that don't know it",
                 quote(extension)
             ));
         }
     }
     if !root.animations.is_empty() && options.frame_time.is_none() {
         warnings.push(
-            "its animations need a time (--frame-time SECONDS); the nodes are rendered where they stand at rest".into(),
+            "its animations need a time (--frame-time SECONDS); everything is rendered as it stands at rest".into(),
         );
     }
 }

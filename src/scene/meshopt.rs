@@ -9,7 +9,8 @@ use meshopt::{
 };
 use serde::Deserialize;
 
-use super::buffer::{MAX_TOTAL_SIZE, slice};
+use super::budget::Budget;
+use super::buffer::slice;
 use super::diagnostic::{Check, damaged, label};
 
 /// The extension's name.
@@ -59,9 +60,8 @@ pub(super) fn is_fallback(buffer: &Buffer) -> bool {
 }
 
 /// The bytes of each view that is stored compressed, by its index.
-pub(super) fn decode_views(root: &Root, buffers: &[Vec<u8>]) -> Check<HashMap<usize, Vec<u8>>> {
+pub(super) fn decode_views(root: &Root, buffers: &[Vec<u8>], budget: &Budget) -> Check<HashMap<usize, Vec<u8>>> {
     let mut decoded = HashMap::new();
-    let mut total = 0;
     for (index, view) in root.buffer_views.iter().enumerate() {
         let extensions = view.extensions.as_ref();
         let Some(extension) = extensions.and_then(|extensions| extensions.others.get(EXTENSION)) else {
@@ -70,13 +70,7 @@ pub(super) fn decode_views(root: &Root, buffers: &[Vec<u8>]) -> Check<HashMap<us
         let bytes = Compressed::deserialize(extension)
             .map_err(|error| damaged(error.to_string()))
             .and_then(|compressed| {
-                total += compressed.check(view)?;
-                if total > MAX_TOTAL_SIZE {
-                    return Err(format!(
-                        "it and those before have {total} bytes, more than the {MAX_TOTAL_SIZE} that are read; \
-                         split the scene"
-                    ));
-                }
+                budget.take(compressed.check(view)?, "what it stands for")?;
                 compressed.decode(buffers)
             });
         let bytes = bytes.map_err(|what| {

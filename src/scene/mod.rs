@@ -6,6 +6,7 @@
 mod accessor;
 mod animation;
 mod attributes;
+mod budget;
 mod buffer;
 mod builder;
 mod bvh;
@@ -45,6 +46,7 @@ mod sphere;
 mod tangents;
 mod texture;
 
+pub use budget::MEMORY_LIMIT;
 pub use features::SceneFeatures;
 pub(crate) use features::{DIELECTRIC, GLOSSY, MIRROR};
 pub use light_sources::MOST_SOURCES;

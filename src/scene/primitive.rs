@@ -50,7 +50,7 @@ impl<'a> Primitive<'a> {
             Checked::Valid(Mode::TriangleFan) => Topology::Fan,
             Checked::Valid(mode) => {
                 warnings.push(format!(
-                    "{label}: its {mode:?} are skipped: only triangles are rendered"
+                    "{label}: its {mode:?} are skipped and missing in the picture: only triangles are rendered; make tubes or spheres of them"
                 ));
                 return Ok(None);
             }
@@ -58,7 +58,9 @@ impl<'a> Primitive<'a> {
         };
         check_draco(&document.root, primitive)?;
         let Some(attributes) = Attributes::open(document, primitive)? else {
-            warnings.push(format!("{label}: it has no POSITION and is skipped"));
+            warnings.push(format!(
+                "{label}: it has no POSITION and is skipped, as other viewers do"
+            ));
             return Ok(None);
         };
         let indices = primitive
@@ -92,14 +94,14 @@ impl<'a> Primitive<'a> {
             if opened.generated_tangents.is_none() {
                 warnings.push(format!(
                     "{label}: its normal texture needs tangents, which can't be made: more than {MAX_AROUND} of its \
-                     triangles meet in a point"
+                     triangles meet in a point; it is rendered without that texture: export tangents"
                 ));
             }
         }
         let excess = opened.sequence_length() % 3;
         if matches!(topology, Topology::List) && excess != 0 {
             warnings.push(format!(
-                "{label}: its last {excess} indices form no triangle and are skipped"
+                "{label}: its last {excess} indices form no triangle and are skipped; nothing else is missing"
             ));
         }
         Ok((opened.triangle_count() > 0).then_some(opened))

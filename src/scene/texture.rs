@@ -13,9 +13,6 @@ use super::document::Document;
 use super::image::Pixels;
 use crate::layout::{CLAMP, MIRROR_REPEAT, NEAREST, REPEAT, SECOND_SET, SRGB, TextureLookup, WRAP_U, WRAP_V};
 
-/// Texels of all images at the most, 2 GiB: a small file can name many large images.
-const MOST_TEXELS: u64 = 1 << 29;
-
 /// Source of a texture that names no image.
 const NO_SOURCE: usize = u32::MAX as usize;
 
@@ -104,10 +101,12 @@ impl<'a> TextureReader<'a> {
             Some(place) => *place,
             None => {
                 let label = label("image", index, image.name.as_deref());
-                let place = match Pixels::read(self.document, image, self.folder, self.room()) {
+                let place = match Pixels::read(self.document, image, self.folder) {
                     Ok(pixels) => Some(self.add(&pixels)),
                     Err(what) => {
-                        warnings.push(format!("{label}: {what}; its textures are left out"));
+                        warnings.push(format!(
+                            "{label}: {what}; its textures are left out, and materials have their factors alone"
+                        ));
                         None
                     }
                 };
@@ -139,7 +138,8 @@ impl<'a> TextureReader<'a> {
             .unwrap_or(wanted.set);
         if set > 1 {
             warnings.push(format!(
-                "its TEXCOORD_{set} isn't read, only sets 0 and 1 are; set 0 is used"
+                "its TEXCOORD_{set} isn't read, only sets 0 and 1 are; set 0 is used, and the texture lies elsewhere than meant: export \
+                 it with set 0 or 1"
             ));
         }
         let [row_u, row_v] = rows(transform)?;
@@ -167,11 +167,6 @@ impl<'a> TextureReader<'a> {
 }
 
 impl TextureReader<'_> {
-    /// Texels that can still be read.
-    fn room(&self) -> u64 {
-        MOST_TEXELS - self.textures.texels.len() as u64
-    }
-
     /// Adds an image; returns its first texel and its size.
     fn add(&mut self, pixels: &Pixels) -> [u32; 2] {
         let texels = &mut self.textures.texels;

@@ -251,3 +251,17 @@ fn json_of_another_structure_is_refused() {
         }
     }
 }
+
+#[test]
+fn buffers_and_triangles_take_no_more_memory_than_the_scene_may() {
+    let mut room = Fixture::room();
+    let triangles: Vec<u16> = [0, 1, 2].repeat(100_000);
+    let indices = room.add_indices(&triangles);
+    room.set("/meshes/0/primitives/0/indices", json!(indices));
+    room.load_within(16 << 20)
+        .expect("600 kB of indices, 2 MB of triangles");
+    for (limit, what) in [(100_000, "what its buffers hold"), (1_500_000, "mesh 0")] {
+        let error = room.load_within(limit).expect_err("too large").to_string();
+        assert!(error.contains(what) && error.contains("--memory-limit 1"), "{error}");
+    }
+}

@@ -244,6 +244,17 @@ impl Fixture {
         )
     }
 
+    /// Loads it with so many bytes of memory at the most.
+    pub fn load_within(&self, memory_limit: u64) -> Result<Scene> {
+        self.write("room.bin", &self.binary);
+        self.write("room.gltf", self.json.to_string().as_bytes());
+        let options = LoadOptions {
+            memory_limit: Some(memory_limit),
+            ..LoadOptions::default()
+        };
+        Scene::load_with(&self.path("room.gltf"), options)
+    }
+
     /// The same, with an environment around it.
     pub fn load_under(&self, environment: Environment) -> Result<Scene> {
         self.write("room.bin", &self.binary);

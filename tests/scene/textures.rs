@@ -8,6 +8,7 @@ use ppm_vk::scene::Alpha;
 use serde_json::{Value, json};
 
 use super::fixture::Fixture;
+use crate::allocations::peak_of;
 
 /// A PNG of two texels side by side, as a data URI.
 fn two_texels() -> String {
@@ -163,4 +164,51 @@ fn alpha_is_as_the_file_says() {
     let mask = |cutoff| Alpha::Mask { alpha: 0.25, cutoff };
     assert_eq!(with(json!({"alphaMode": "MASK"})), mask(0.5));
     assert_eq!(with(json!({"alphaMode": "MASK", "alphaCutoff": 0.2})), mask(0.2));
+}
+
+/// A black PNG in the room's folder, of which the room's floor has so many copies as textures.
+fn with_images(count: usize, side: u32) -> Fixture {
+    let mut room = Fixture::room();
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbImage::new(side, side)
+        .write_to(&mut png, image::ImageFormat::Png)
+        .expect("a PNG");
+    room.write("black.png", &png.into_inner());
+    let material = |index| with_base_color(json!({"index": index}));
+    room.set("/materials", (0..count).map(material).collect());
+    room.set("/textures", (0..count).map(|index| json!({"source": index})).collect());
+    room.set("/images", (0..count).map(|_| json!({"uri": "black.png"})).collect());
+    let primitive = room.json["meshes"][0]["primitives"][0].clone();
+    for index in 1..count {
+        let mut primitive = primitive.clone();
+        primitive["material"] = json!(index);
+        room.set("/meshes/0/primitives/-", primitive);
+    }
+    room
+}
+
+#[test]
+fn the_pixels_of_an_image_decide_how_much_of_its_file_is_read() {
+    let room = with_images(2, 4);
+    // What follows the picture takes no room on the disk, but 6 GiB in memory.
+    let file = std::fs::File::options().append(true).open(room.path("black.png"));
+    file.and_then(|file| file.set_len(6 << 30)).expect("a sparse file");
+    let (scene, peak) = peak_of(|| room.scene());
+    assert_eq!(scene.textures.texels.len(), 2 * 16);
+    assert!(peak < 200 << 20, "{peak} bytes for 16 texels");
+}
+
+#[test]
+fn images_take_no_more_memory_than_the_scene_may() {
+    let room = with_images(40, 512);
+    let load = |memory_limit| room.load_within(memory_limit);
+    load(64 << 20).expect("40 MiB");
+    let (result, peak) = peak_of(|| load(20 << 20));
+    let error = result.expect_err("too large").to_string();
+    assert!(
+        error.contains("an image of 512x512 texels") && error.contains("--memory-limit") && !error.contains('\n'),
+        "{error}"
+    );
+    // Pixels move to where there is room for more of them.
+    assert!(peak < 60 << 20, "{peak} bytes");
 }
