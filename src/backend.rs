@@ -136,35 +136,78 @@ impl Counters {
         format!("{photons_landed} photons landed, {photons_stored} kept, {photons_accepted} times accepted")
     }
 
-    /// What of it a user has to know, one line each.
+    /// What of it a user has to know, one line each: what the picture lacks, how much that is, and what to do. `emitted` are the
+    /// photon paths of the render.
     pub fn warnings(&self, emitted: u64, max_depth: u32) -> Vec<String> {
         let mut warnings = Vec::new();
-        if self.truncated_paths > 0 {
+        if self.truncated_share(emitted) >= TELLING_SHARE {
             warnings.push(format!(
-                "{} camera and photon paths reached --max-depth {max_depth} ({emitted} photon paths were emitted); their \
-                 further light is missing",
-                self.truncated_paths
+                "{} camera and photon paths reached --max-depth {max_depth}, {} of {emitted} photon paths; about that share of the \
+                 light is missing, more where all is seen by many bounces: raise --max-depth",
+                self.truncated_paths,
+                percent(self.truncated_share(emitted))
             ));
         }
         if self.cut_paths > 0 {
             warnings.push(format!(
-                "{} paths were ended by the driver's loop limit; their light is missing: use another --device",
-                self.cut_paths
+                "{} paths were ended by the driver's loop limit, {} of {emitted} photon paths; about that share of the light is \
+                 missing: use another --device or --backend cpu",
+                self.cut_paths,
+                percent(share(self.cut_paths, emitted))
             ));
         }
         if self.lost_photons > 0 {
             warnings.push(format!(
-                "{} of {} photons were beyond --cell-photons in {} grid cells; their light is missing",
-                self.lost_photons, self.photons_stored, self.full_cells
+                "{} of {} photons, {}, were beyond --cell-photons in {} grid cells; that share of the light that photons bring is \
+                 missing: raise or leave out --cell-photons",
+                self.lost_photons,
+                self.photons_stored,
+                percent(share(self.lost_photons, self.photons_stored)),
+                self.full_cells
             ));
         }
         if self.non_finite > 0 {
             warnings.push(format!(
-                "{} values were NaN or infinite and were left out",
+                "{} values were NaN or infinite and count as black: a light or a texture of this scene is brighter than numbers \
+                 reach (10^38), or so small that they end; scale its lights down, and raise --exposure",
                 self.non_finite
             ));
         }
         warnings
+    }
+
+    /// What is worth a word, though hardly anything of the picture is missing.
+    pub fn note(&self, emitted: u64, max_depth: u32) -> Option<String> {
+        let share = self.truncated_share(emitted);
+        (self.truncated_paths > 0 && share < TELLING_SHARE).then(|| {
+            format!(
+                "{} paths ended at --max-depth {max_depth}: less than {} of the light",
+                self.truncated_paths,
+                percent(TELLING_SHARE)
+            )
+        })
+    }
+
+    /// The share of the paths that the bounce limit ended, as if all were photon paths. From bounce to bounce about the same share
+    /// goes on, so that those had about as much before them as all had at their start.
+    fn truncated_share(&self, emitted: u64) -> f64 {
+        share(self.truncated_paths, emitted)
+    }
+}
+
+/// The share of the light from which on its lack is a warning: no eye sees less.
+const TELLING_SHARE: f64 = 0.001;
+
+fn share(part: u64, whole: u64) -> f64 {
+    part as f64 / whole.max(1) as f64
+}
+
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent < 0.1 {
+        format!("{percent:.1e} %")
+    } else {
+        format!("{percent:.1} %")
     }
 }
 

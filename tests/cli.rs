@@ -235,6 +235,9 @@ fn arguments_out_of_range_are_refused() {
         ("--time", "0"),
         ("--time", "1e300"),
         ("--time", "nan"),
+        ("--time", "inf"),
+        ("--target-error", "inf"),
+        ("--memory-limit", "0"),
         ("--frame-time", "inf"),
         ("--gather", "magic"),
         ("--estimator", "magic"),
@@ -248,6 +251,82 @@ fn arguments_out_of_range_are_refused() {
     }
     assert_refused(&ppm_vk(folder.path(), &["--quiet"]), "--scene");
     assert!(files(folder.path()).is_empty());
+}
+
+#[test]
+fn refusals_say_what_a_number_must_be() {
+    let folder = TempDir::new().expect("folder");
+    let scene = scene("cornell.gltf");
+    let scene = scene.to_str().expect("UTF-8");
+    for (arguments, words) in [
+        (&["--time=nan"][..], "must be above 0 and finite"),
+        (&["--target-error=inf"], "must be above 0 and finite"),
+        (&["--time=1e300"], "more than can be counted"),
+        (&["--aperture=1e20"], "a lens has a radius of"),
+        (&["--aperture=0.1", "--focus=1e-300"], "too wide to see anything by"),
+    ] {
+        let output = ppm_vk(folder.path(), &[&["--scene", scene], arguments].concat());
+        let text = stderr(&output);
+        assert!(
+            !output.status.success() && text.contains(words),
+            "{arguments:?}: {text}"
+        );
+        assert!(!text.contains("00000000"), "{arguments:?}: {text}");
+    }
+    // Farther than any number that the device has, but what is meant is clear.
+    let output = small_render(
+        folder.path(),
+        Path::new(scene),
+        &["--aperture", "0.01", "--focus", "1e300"],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+}
+
+#[test]
+fn names_do_not_reach_the_terminal_as_commands() {
+    let folder = TempDir::new().expect("folder");
+    let text = std::fs::read_to_string(scene("cornell.gltf")).expect("scene");
+    let mut json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    json["cameras"][0]["name"] = "red \u{1b}[31m \u{202e}\u{9b}2J\n".into();
+    json["materials"][0]["name"] = "\u{1b}]0;title\u{7}".into();
+    json["materials"][0]["pbrMetallicRoughness"] = serde_json::json!({"baseColorFactor": [2, 1, 1, 1]});
+    let file = if cfg!(unix) {
+        "a\u{1b}[31m\n\u{202e}.gltf"
+    } else {
+        "a\u{202e}.gltf"
+    };
+    std::fs::write(folder.path().join(file), json.to_string()).expect("scene");
+    std::fs::copy(scene("cornell.bin"), folder.path().join("cornell.bin")).expect("buffer");
+    let missing = folder.path().join(file).with_extension("glb");
+    let missing = missing.to_str().expect("UTF-8");
+    for arguments in [
+        vec!["inspect", file],
+        vec!["inspect", file, "--json"],
+        vec!["--scene", file, "--camera", "none"],
+        vec!["--scene", missing],
+        vec!["--scene", file, "--time", "\u{1b}[31m\u{202e}"],
+        vec![
+            "--scene",
+            file,
+            "--resolution",
+            "16x16",
+            "--iterations",
+            "1",
+            "--photons",
+            "1000",
+            "--profile",
+        ],
+    ] {
+        let output = ppm_vk(folder.path(), &arguments);
+        let said = [output.stdout, output.stderr]
+            .map(|bytes| String::from_utf8(bytes).expect("UTF-8"))
+            .concat();
+        let command = said
+            .chars()
+            .find(|&c| c != '\n' && (c.is_control() || ('\u{202a}'..='\u{202e}').contains(&c)));
+        assert_eq!(command, None, "{arguments:?}: {}", said.escape_debug());
+        assert!(!said.contains("title\n"), "{arguments:?}: {said}");
+    }
 }
 
 #[test]
@@ -356,11 +435,11 @@ fn pipes_and_devices_are_not_read() {
         );
         let text = stderr(&output);
         assert_eq!(output.status.code(), Some(1), "{text}");
-        assert!(text.contains(name) && text.contains("is no regular file"), "{text}");
+        assert!(text.contains(name) && text.contains("it is no regular file"), "{text}");
     }
     let output = ppm_vk(folder.path(), &["compare", "pipe.exr", "/dev/zero"]);
     assert!(
-        stderr(&output).contains("pipe.exr: is no regular file"),
+        stderr(&output).contains("pipe.exr: can't be opened: it is no regular file"),
         "{}",
         stderr(&output)
     );

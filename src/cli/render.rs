@@ -1,6 +1,5 @@
 //! Renders a scene to files.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -16,7 +15,7 @@ use crate::backend::Backend;
 use crate::config::{EmissionChoice, Estimator, RenderConfig, Sampler};
 use crate::estimate::{ErrorEstimate, RelativeError, of_one_photon};
 use crate::files::Writing;
-use crate::film::{self, Metadata};
+use crate::film::{self, Image, Metadata};
 use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
@@ -60,7 +59,8 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     if config.estimator == Estimator::Ppm && chooses {
         say!(
             "warning: --estimator ppm finds visible points once: where a wavelength, alpha, a coat or a part of the light is chosen \
-             by chance, each pixel keeps its first choice; use --estimator sppm"
+             by chance, each pixel keeps its first choice, and the picture stays grainy there, however long it renders; use \
+             --estimator sppm"
         );
     }
     let mut backend = open(backend_choice, arguments.device.as_deref(), &packed, camera, &config)?;
@@ -110,6 +110,15 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     };
     for warning in backend.counters().warnings(rendered.emitted, config.max_depth) {
         say!("warning: {warning}");
+    }
+    if let Some(note) = backend.counters().note(rendered.emitted, config.max_depth) {
+        say!("{note}");
+    }
+    if is_black(&rendered.picture.image) {
+        say!(
+            "warning: the picture is black: no light has come to what the camera sees; is there a light that shines there, and \
+             nothing before the camera?"
+        );
     }
     write_outputs(arguments, &output, &work.estimate, &rendered, &subject)?;
     Ok(if interrupt::asked() {
@@ -166,6 +175,10 @@ fn write_outputs(
     }
     ensure!(failures.is_empty(), "{}", failures.join("; "));
     Ok(())
+}
+
+fn is_black(image: &Image) -> bool {
+    image.pixels().iter().flatten().all(|&value| value == 0.0)
 }
 
 fn say_rendered(output: &Path, rendered: &Rendered, subject: &Subject, error: Option<RelativeError>) {
