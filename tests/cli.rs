@@ -743,6 +743,25 @@ fn environments_that_cannot_be_read_are_one_line() {
 }
 
 #[test]
+fn an_environment_takes_no_more_memory_than_the_scene_may() {
+    let folder = TempDir::new().expect("folder");
+    // A few bytes that claim to be 134 million pixels.
+    std::fs::write(
+        folder.path().join("sky.hdr"),
+        "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n",
+    )
+    .expect("a file");
+    let output = small_render(folder.path(), &scene("lights.gltf"), &["--environment", "sky.hdr"]);
+    assert_fails(&folder, &output, &["sky.hdr", "134217728 pixels", "--memory-limit 3"]);
+    let more = ["--environment", "sky.hdr", "--memory-limit", "3"];
+    assert_fails(
+        &folder,
+        &small_render(folder.path(), &scene("lights.gltf"), &more),
+        &["sky.hdr", "cut short"],
+    );
+}
+
+#[test]
 fn values_of_an_environment_that_are_no_radiance_are_counted() {
     let folder = TempDir::new().expect("folder");
     let image = ppm_vk::film::Image::new(2, 1, vec![[f32::NAN, 1.0, -1.0], [1.0; 3]]);

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::args::{number, positive};
 use super::progress::{READING, while_showing};
-use crate::scene::{Environment, LoadOptions, Scene};
+use crate::scene::{Environment, LoadOptions, MEMORY_LIMIT, Scene};
 
 /// How a scene's file is read.
 #[derive(Debug, Args)]
@@ -46,17 +46,18 @@ impl SceneArguments {
 
     /// Reads the scene.
     pub fn load(&self, path: &Path, quiet: bool) -> Result<Scene> {
+        let memory_limit = self
+            .memory_limit
+            .map_or(MEMORY_LIMIT, |gibibytes| (gibibytes * f64::from(1 << 30)) as u64);
         let environment = match &self.environment {
             None => None,
             Some(EnvironmentChoice::Constant(radiance)) => Some(Environment::constant((*radiance).into())),
-            Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture)?),
+            Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture, memory_limit)?),
         };
         let options = LoadOptions {
             frame_time: self.frame_time,
             environment,
-            memory_limit: self
-                .memory_limit
-                .map(|gibibytes| (gibibytes * f64::from(1 << 30)) as u64),
+            memory_limit: Some(memory_limit),
         };
         Ok(while_showing(READING, quiet, || Scene::load_with(path, options))?)
     }

@@ -17,12 +17,7 @@ const MAX_PIXELS: u64 = 1 << 27;
 /// A file that can't be opened, is damaged or cut short, or has more than 2²⁷ pixels.
 pub fn read_hdr(path: &Path) -> Result<Image> {
     let file = files::open(path)?;
-    let damaged = |error: image::ImageError| {
-        Error::file(
-            path,
-            format!("can't be read as Radiance HDR ({error}): is it another format, or cut short?"),
-        )
-    };
+    let damaged = |error: image::ImageError| unreadable(path, &error);
     let decoder = HdrDecoder::new(BufReader::new(file)).map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     if !(1..=MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
@@ -34,6 +29,23 @@ pub fn read_hdr(path: &Path) -> Result<Image> {
     let picture = DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgb32f();
     let pixels = picture.pixels().map(|pixel| pixel.0).collect();
     Ok(Image::new(width as usize, height as usize, pixels))
+}
+
+/// Pixels of such a file, by its first bytes.
+///
+/// # Errors
+/// A file that can't be opened or isn't such a one.
+pub fn hdr_pixels(path: &Path) -> Result<u64> {
+    let decoder = HdrDecoder::new(BufReader::new(files::open(path)?)).map_err(|error| unreadable(path, &error))?;
+    let (width, height) = decoder.dimensions();
+    Ok(u64::from(width) * u64::from(height))
+}
+
+fn unreadable(path: &Path, error: &image::ImageError) -> Error {
+    Error::file(
+        path,
+        format!("can't be read as Radiance HDR ({error}): is it another format, or cut short?"),
+    )
 }
 
 #[cfg(test)]

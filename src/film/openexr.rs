@@ -131,14 +131,28 @@ pub fn read_exr(path: &Path) -> Result<Image> {
     decode(BufReader::new(file), path)
 }
 
+/// Pixels of the largest picture in an OpenEXR file, by its headers.
+///
+/// # Errors
+/// A file that can't be opened or isn't OpenEXR.
+pub fn exr_pixels(path: &Path) -> Result<u64> {
+    let reader =
+        exr::block::read(BufReader::new(files::open(path)?), false).map_err(|error| unreadable(path, &error))?;
+    let sizes = |header: &Header| [header.layer_size, header.shared_attributes.display_window.size];
+    let pixels = |Vec2(width, height): Vec2<usize>| (width as u64).saturating_mul(height as u64);
+    Ok(reader.headers().iter().flat_map(sizes).map(pixels).max().unwrap_or(0))
+}
+
+fn unreadable(path: &Path, error: &exr::error::Error) -> Error {
+    Error::file(
+        path,
+        format!("can't be read as OpenEXR ({error}): is it another format, or cut short?"),
+    )
+}
+
 /// Reads the OpenEXR file `source`; errors name it `path`.
 fn decode(source: impl Read + Seek, path: &Path) -> Result<Image> {
-    let damaged = |error: exr::error::Error| {
-        Error::file(
-            path,
-            format!("can't be read as OpenEXR ({error}): is it another format, or cut short?"),
-        )
-    };
+    let damaged = |error: exr::error::Error| unreadable(path, &error);
     let reader = exr::block::read(source, false).map_err(damaged)?;
     check_headers(reader.headers()).map_err(|what| Error::file(path, what))?;
 

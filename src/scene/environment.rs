@@ -9,7 +9,8 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 
 use crate::error::{Error, Result};
-use crate::film::{Image, read_exr, read_hdr};
+use crate::film::{Image, exr_pixels, hdr_pixels, read_exr, read_hdr};
+use crate::text::bytes;
 
 /// Pixels that a picture is reduced to: as many as one buffer of every device holds.
 const MAX_PIXELS: usize = 1 << 22;
@@ -37,15 +38,21 @@ impl Environment {
         }
     }
 
-    /// Reads an OpenEXR or Radiance picture, by the name's end.
+    /// Reads an OpenEXR or Radiance picture, by the name's end, that may take so many bytes of memory.
     ///
     /// # Errors
-    /// A file that can't be read, whose name ends in neither `.exr` nor `.hdr`, or that is black.
-    pub fn read(path: &Path) -> Result<Self> {
+    /// A file that can't be read, whose name ends in neither `.exr` nor `.hdr`, that is too large, or black.
+    pub fn read(path: &Path, memory_limit: u64) -> Result<Self> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let image = match extension.to_str() {
-            Some("exr") => read_exr(path)?,
-            Some("hdr") => read_hdr(path)?,
+            Some("exr") => {
+                check_size(path, exr_pixels(path)?, memory_limit)?;
+                read_exr(path)?
+            }
+            Some("hdr") => {
+                check_size(path, hdr_pixels(path)?, memory_limit)?;
+                read_hdr(path)?
+            }
             _ => {
                 return Err(Error::file(
                     path,
@@ -175,6 +182,26 @@ impl Environment {
         })
         .collect()
     }
+}
+
+/// Bytes that reading takes for a pixel: as the file has it, and as it is kept.
+const BYTES_A_PIXEL: u64 = 24;
+
+fn check_size(path: &Path, pixels: u64, memory_limit: u64) -> Result<()> {
+    let needed = pixels.saturating_mul(BYTES_A_PIXEL);
+    if needed <= memory_limit {
+        return Ok(());
+    }
+    Err(Error::file(
+        path,
+        format!(
+            "has {pixels} pixels, for which {} of memory are needed, more than the {} that a scene may take; scale it down, or allow \
+             more by --memory-limit {}",
+            bytes(needed),
+            bytes(memory_limit),
+            needed.div_ceil(1 << 30)
+        ),
+    ))
 }
 
 /// A table of no light, for scenes without an environment.
