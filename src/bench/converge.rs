@@ -121,12 +121,19 @@ fn follow(
     let mut next = 1;
     loop {
         let begin = Instant::now();
-        let run = renderer.iterate()?;
+        let stop = || (what.stop)() || wall_s + begin.elapsed().as_secs_f64() >= what.seconds;
+        let run = renderer.iterate_unless(&stop)?;
         wall_s += begin.elapsed().as_secs_f64();
-        device_s += run.launches.iter().map(|launch| launch.duration_ns * 1e-9).sum::<f64>();
+        let launches = run.iter().flat_map(|run| &run.launches);
+        device_s += launches.map(|launch| launch.duration_ns * 1e-9).sum::<f64>();
         let iterations = renderer.iterations();
-        let last = wall_s >= what.seconds || (what.stop)();
-        if iterations == next || last {
+        let last = run.is_none() || wall_s >= what.seconds || (what.stop)();
+        let is_known = known
+            .curves
+            .last()
+            .and_then(|curve| curve.points.last())
+            .is_some_and(|point| point.iterations == iterations);
+        if (iterations == next || last) && !is_known {
             let picture = renderer.resolve_all()?;
             let comparison = compare(&picture.image, what.reference)?;
             if let Some(curve) = known.curves.last_mut() {

@@ -7,7 +7,7 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory};
 
 use super::args::{Arguments, gather_method, png_file, positive, resolution};
-use super::outputs::{check_outputs, named};
+use super::outputs::{all, check_outputs, named};
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
 use crate::config::{EmissionChoice, Probe, RenderConfig};
@@ -117,15 +117,15 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
             Box::new(move || bench::plot_methods(&results)),
         )
     };
-    if let Some(file) = &arguments.json {
-        write_whole(file, &json)?;
-    }
-    if let Some(file) = &arguments.plot {
-        write_whole(file, plot()?.as_bytes())?;
-    }
-    if let Some(file) = &arguments.clusters {
-        write_clusters(&bench, file)?;
-    }
+    let written = [
+        arguments.json.as_ref().map(|file| Ok(write_whole(file, &json)?)),
+        arguments
+            .plot
+            .as_ref()
+            .map(|file| Ok(write_whole(file, plot()?.as_bytes())?)),
+        arguments.clusters.as_ref().map(|file| write_clusters(&bench, file)),
+    ];
+    all(written.into_iter().flatten())?;
     Ok(Outcome::Done)
 }
 

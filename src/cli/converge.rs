@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 
 use super::args::seconds;
-use super::outputs::{check_outputs, named};
+use super::outputs::{all, check_outputs, named};
 use super::scene::SceneArguments;
 use super::{Outcome, interrupt, print};
 use crate::bench::{Converge, Curve, converge, converge_table, csv, plot_convergence};
@@ -163,14 +163,19 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
     };
     interrupt::install()?;
     let mut table = String::new();
+    // What is measured next is written anew: a file that can't be doesn't end it.
+    let mut written = Ok(());
     converge(&what, &note, &mut |convergence| {
         table = converge_table(convergence);
-        if let Some(file) = &arguments.csv {
-            write_whole(file, csv(convergence).as_bytes())?;
-        }
-        if let Some(file) = &arguments.plot {
-            write_whole(file, plot_convergence(convergence)?.as_bytes())?;
-        }
+        let plot = |file| Ok(write_whole(file, plot_convergence(convergence)?.as_bytes())?);
+        let files = [
+            arguments
+                .csv
+                .as_deref()
+                .map(|file| Ok(write_whole(file, csv(convergence).as_bytes())?)),
+            arguments.plot.as_deref().map(plot),
+        ];
+        written = all(files.into_iter().flatten());
         let is_reference = |curve: &Curve| curve.points.last().is_some_and(|point| point.rel_mse == 0.0);
         if let Some(curve) = convergence.curves.iter().find(|curve| is_reference(curve)) {
             say!(
@@ -180,7 +185,7 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
         }
         Ok(())
     })?;
-    print(&table)?;
+    all([print(&table).map(|_| ()), written])?;
     Ok(if interrupt::asked() {
         Outcome::Interrupted
     } else {

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, bail, ensure};
 
 use crate::film::check_writable;
 
@@ -70,7 +70,7 @@ pub fn check_outputs<'a>(inputs: &[&Path], outputs: impl Iterator<Item = &'a Pat
     for output in &outputs {
         let place = Place::of(output);
         if let Some((other, what, _)) = taken.iter().find(|(.., other)| place.is(other)) {
-            anyhow::bail!(
+            bail!(
                 "{}: would overwrite {}, which this command {what}; name another file",
                 output.display(),
                 other.display()
@@ -79,6 +79,14 @@ pub fn check_outputs<'a>(inputs: &[&Path], outputs: impl Iterator<Item = &'a Pat
         taken.push((output, "writes too", place));
     }
     outputs.into_iter().try_for_each(|output| Ok(check_writable(output)?))
+}
+
+/// Fails if any of these has, with all that failed in one line: what can't be written doesn't stop the others.
+pub fn all(written: impl IntoIterator<Item = Result<()>>) -> Result<()> {
+    let failures = written.into_iter().filter_map(Result::err);
+    let failures: Vec<String> = failures.map(|error| format!("{error:#}")).collect();
+    ensure!(failures.is_empty(), "{}", failures.join("; "));
+    Ok(())
 }
 
 /// Formats that the end of a name may say.

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Error, Result};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::args::{Arguments, BackendChoice, RenderArguments};
-use super::outputs::check_outputs;
+use super::outputs::{all, check_outputs};
 use super::progress::{BUILDING, Limits, Progress, while_showing, with_prefix};
 use super::work::{Rendered, Work};
 use super::{Outcome, interrupt};
@@ -151,30 +151,25 @@ fn write_outputs(
         estimated_error: error.map(|error| error.total),
     };
     let errors = estimate.of_pixels(rendered.iterations, &rendered.picture);
-    let mut failures: Vec<String> = rendered.failure.iter().cloned().collect();
-    let mut note = |result: Result<()>| {
-        let is_done = result.is_ok();
-        failures.extend(result.err().map(|error| format!("{error:#}")));
-        is_done
-    };
-    if note(film::write_exr(image, errors.as_ref(), output, &metadata).map_err(Into::into)) {
+    let picture = film::write_exr(image, errors.as_ref(), output, &metadata);
+    if picture.is_ok() {
         say_rendered(output, rendered, subject, error);
     }
-    if let Some(png) = &arguments.png {
-        note(film::write_png(image, png, arguments.exposure).map_err(Into::into));
-    }
-    let profile = &rendered.profile;
-    if arguments.profile {
-        note(super::print(&profile.table(subject)).map(|_| ()));
-    }
-    if let Some(file) = &arguments.profile_json {
-        note(write_json(file, &profile.json(subject)));
-    }
-    if let Some(file) = &arguments.trace {
-        note(write_json(file, &profile.trace(subject)));
-    }
-    ensure!(failures.is_empty(), "{}", failures.join("; "));
-    Ok(())
+    let (png, profile) = (arguments.png.as_ref(), &rendered.profile);
+    let json = |file: &Option<PathBuf>, value: &dyn Fn() -> serde_json::Value| {
+        file.as_ref().map(|file| write_json(file, &value()))
+    };
+    let written = [
+        rendered.failure.clone().map(|failure| Err(Error::msg(failure))),
+        Some(picture.map_err(Error::from)),
+        png.map(|file| Ok(film::write_png(image, file, arguments.exposure)?)),
+        arguments
+            .profile
+            .then(|| super::print(&profile.table(subject)).map(|_| ())),
+        json(&arguments.profile_json, &|| profile.json(subject)),
+        json(&arguments.trace, &|| profile.trace(subject)),
+    ];
+    all(written.into_iter().flatten())
 }
 
 fn is_black(image: &Image) -> bool {
