@@ -138,3 +138,37 @@ pub fn resolve(
     }
     (film, glass_film, non_finite)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_f32_cannot_hold_is_black_and_counted_as_on_a_device() {
+        let settings = Settings {
+            resolution: [2, 1],
+            slots_per_pixel: 1,
+            ..Settings::zeroed()
+        };
+        let slots = pixel_slots(&settings);
+        let mut statistics = vec![Statistics::zeroed(); slots];
+        for (statistics, radius2) in statistics.iter_mut().zip([1e-20, 1.0]) {
+            (statistics.radius2_high, statistics.flux_high) = (radius2, [1e30, 1.0, 1.0, 0.0]);
+        }
+        let (film, _, non_finite) = resolve(
+            &settings,
+            &vec![VisiblePoint::zeroed(); slots],
+            &statistics,
+            &vec![DirectSum::zeroed(); slots],
+            &vec![Coverage::zeroed(); slots],
+            1,
+            1,
+        );
+        assert_eq!((film[0], non_finite), ([0.0; 4], 1));
+        assert!(film[1][0] > 1e29, "{:?}", film[1]);
+        let mut sums = vec![[1e38; 4]; SEQUENCES as usize * slots];
+        sums[0][0] = f32::INFINITY;
+        let film = resolve_sequences(&settings, &sums, 4);
+        assert_eq!((film[0], film[1]), ([0.0; 4], [1e38; 4]));
+    }
+}

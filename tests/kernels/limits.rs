@@ -129,3 +129,58 @@ fn an_iteration_in_batches_gathers_what_one_batch_gathers() {
         }
     }
 }
+
+#[test]
+fn an_iteration_that_is_cut_short_counts_with_its_photons_if_it_is_the_first_and_else_not_at_all() {
+    let config = |photons| RenderConfig {
+        resolution: [16, 16],
+        photons,
+        radius: Some(0.1),
+        emission: EmissionChoice::Power,
+        ..small()
+    };
+    let loaded = super::bench::scene("cornell-spheres");
+    let scene = super::bench::packed(&loaded);
+    let camera = &loaded.cameras[0];
+    let on_device = |photons, buffer_bytes| {
+        let device = Device::open(None).expect("a device");
+        Renderer::within(buffer_bytes, device, &scene, camera, config(photons)).expect("a renderer")
+    };
+    let on_cpu = |photons| cpu::Renderer::new(&scene, camera, config(photons)).expect("a renderer");
+
+    let mut device = on_device(4_000_000_000, 1 << 20);
+    let mut processor = on_cpu(4_000_000_000);
+    let cut: [&mut dyn Backend; 2] = [&mut device, &mut processor];
+    for (name, cut) in ["device", "CPU"].into_iter().zip(cut) {
+        cut.iterate_unless(&|| true)
+            .expect("an iteration")
+            .expect("the first one counts");
+        let emitted = cut.emitted();
+        assert_eq!(cut.iterations(), 1, "{name}");
+        assert!((1..4_000_000).contains(&emitted), "{name}: {emitted} paths");
+        let first = cut.resolve().expect("a picture");
+
+        let paths = u32::try_from(emitted).expect("few paths");
+        let mut whole: Box<dyn Backend> = match name {
+            "device" => Box::new(on_device(paths, 64 << 20)),
+            _ => Box::new(on_cpu(paths)),
+        };
+        whole.iterate().expect("an iteration");
+        let whole_counters = whole.counters();
+        whole.resolve().expect("a picture");
+        let stored = cut.counters().photons_stored;
+        assert!(stored > 1000, "{name}: {stored} photons");
+        assert_eq!(
+            stored, whole_counters.photons_stored,
+            "{name}: of {paths} paths, in a whole iteration"
+        );
+
+        assert!(cut.iterate_unless(&|| true).expect("no error").is_none(), "{name}");
+        assert_eq!((cut.iterations(), cut.emitted()), (1, emitted), "{name}");
+        assert!(
+            cut.resolve().expect("a picture") == first,
+            "{name}: the second one left something in the picture"
+        );
+        assert_eq!(cut.counters().photons_stored, stored, "{name}");
+    }
+}
