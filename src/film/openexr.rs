@@ -7,7 +7,7 @@ use exr::image::read::image::ReadLayers;
 use exr::image::read::layers::ReadChannels;
 use exr::image::read::specific_channels::ReadSpecificChannel;
 use exr::image::write::WritableImage;
-use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Layer};
+use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Layer, SpecificChannels};
 use exr::math::Vec2;
 use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
 use exr::meta::header::{Header, LayerAttributes};
@@ -118,13 +118,13 @@ fn sort_attributes(file: &mut [u8]) {
     header[..sorted.len()].copy_from_slice(&sorted);
 }
 
-/// Reads the first layer with channels R, G and B of an OpenEXR file; half, float and integer samples become `f32`,
+/// Reads the first layer with channels R, G and B of an OpenEXR file, or else with luminance Y alone, which is grey; half, float and integer samples become `f32`,
 /// other channels are left out.
 ///
 /// The picture is the file's display window: pixels that the data window lacks are black, what lies outside is cut.
 ///
 /// # Errors
-/// A file that can't be opened, is damaged or cut short, has no RGB layer, has subsampled channels, or has more than
+/// A file that can't be opened, is damaged or cut short, has no such layer, has subsampled channels, or has more than
 /// 2²⁷ pixels.
 pub fn read_exr(path: &Path) -> Result<Image> {
     let file = files::open(path)?;
@@ -156,26 +156,64 @@ fn decode(source: impl Read + Seek, path: &Path) -> Result<Image> {
     let reader = exr::block::read(source, false).map_err(damaged)?;
     check_headers(reader.headers()).map_err(|what| Error::file(path, what))?;
 
-    let picture = exr::image::read::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .specific_channels()
-        .required("R")
-        .required("G")
-        .required("B")
-        .collect_pixels(
-            |Vec2(width, height), _| Image::new(width, height, vec![[0.0; 3]; width * height]),
-            |image, Vec2(x, y), (r, g, b): (f32, f32, f32)| image.pixels[y * image.width + x] = [r, g, b],
-        )
-        .first_valid_layer()
-        .all_attributes()
-        // A decoder that panics over a damaged file would abort the process from one of rayon's threads.
-        .non_parallel()
-        .from_chunks(reader)
-        .map_err(damaged)?;
+    let black = |Vec2(width, height)| Image::new(width, height, vec![[0.0; 3]; width * height]);
+    let levels = || exr::image::read::read().no_deep_data().largest_resolution_level();
+    // A decoder that panics over a damaged file would abort the process from one of rayon's threads.
+    let picture = if is_grey(reader.headers()) {
+        levels()
+            .specific_channels()
+            .required("Y")
+            .collect_pixels(
+                |size, _| black(size),
+                |image, Vec2(x, y), (luminance,): (f32,)| {
+                    image.pixels[y * image.width + x] = [luminance; 3];
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_chunks(reader)
+            .map(parts)
+    } else {
+        levels()
+            .specific_channels()
+            .required("R")
+            .required("G")
+            .required("B")
+            .collect_pixels(
+                |size, _| black(size),
+                |image, Vec2(x, y), (r, g, b): (f32, f32, f32)| {
+                    image.pixels[y * image.width + x] = [r, g, b];
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_chunks(reader)
+            .map(parts)
+    };
+    let (image, position, display) = picture.map_err(damaged)?;
+    Ok(crop(image, position, display))
+}
+
+/// The pixels that were read, where they lie, and what of them is to be shown.
+fn parts<C>(picture: exr::image::Image<Layer<SpecificChannels<Image, C>>>) -> (Image, Vec2<i32>, IntegerBounds) {
     let layer = picture.layer_data;
-    let (position, display) = (layer.attributes.layer_position, picture.attributes.display_window);
-    Ok(crop(layer.channel_data.pixels, position, display))
+    let position = layer.attributes.layer_position;
+    (layer.channel_data.pixels, position, picture.attributes.display_window)
+}
+
+/// Whether luminance alone is all that there is: no layer has colours, and one has luminance without chroma.
+fn is_grey(headers: &[Header]) -> bool {
+    let has = |header: &Header, names: &[&str]| {
+        let channels = &header.channels.list;
+        names
+            .iter()
+            .all(|&name| channels.iter().any(|channel| channel.name == *name))
+    };
+    let in_color = |header: &Header| has(header, &["R", "G", "B"]);
+    let is_grey = |header: &Header| has(header, &["Y"]) && !has(header, &["RY"]) && !has(header, &["BY"]);
+    !headers.iter().any(in_color) && headers.iter().any(is_grey)
 }
 
 /// Refuses what the `exr` crate would spend all memory on or can't do, before any pixel is read.
@@ -364,6 +402,20 @@ mod tests {
     }
 
     #[test]
+    fn luminance_alone_is_grey_and_colours_are_preferred_to_it() {
+        let window = IntegerBounds::new((0, 0), (5, 3));
+        let half = Sample::F16(exr::prelude::f16::from_f32(0.5));
+        for names in [&["Y"][..], &["A", "Y"], &["B", "G", "R", "Y"]] {
+            let (_folder, path) = foreign(names, half, window, window);
+            assert_eq!(
+                read_exr(&path).expect("a picture").pixels,
+                vec![[0.5; 3]; 15],
+                "{names:?}"
+            );
+        }
+    }
+
+    #[test]
     fn a_picture_is_its_display_window() {
         let display = IntegerBounds::new((10, 20), (3, 2));
         let lit = |data: IntegerBounds| {
@@ -386,11 +438,11 @@ mod tests {
         let text = folder.path().join("text.exr");
         fs::write(&text, "no picture at all").expect("a file");
         let window = IntegerBounds::new((0, 0), (5, 3));
-        let (_grey_folder, grey) = foreign(&["Y"], Sample::F32(1.0), window, window);
+        let (_chroma_folder, chroma) = foreign(&["BY", "RY", "Y"], Sample::F32(1.0), window, window);
         let missing = folder.path().join("missing.exr");
         for (path, expected) in [
             (text.as_path(), "can't be read as OpenEXR"),
-            (grey.as_path(), "can't be read as OpenEXR"),
+            (chroma.as_path(), "can't be read as OpenEXR"),
             (missing.as_path(), "can't be opened"),
             (folder.path(), "can't be"),
         ] {
