@@ -10,7 +10,7 @@ use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::{Buffer, Root};
 
 use super::budget::Budget;
-use super::diagnostic::{Check, damaged, label, quote};
+use super::diagnostic::{Check, Warnings, damaged, label, quote};
 use super::meshopt;
 
 /// Base64 that may lack its padding, which some exporters leave out.
@@ -21,8 +21,17 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
+/// Bytes that a buffer may lack at its end: some exporters count padding that they don't write.
+const MOST_PADDING: u64 = 3;
+
 /// Reads each buffer of `root`. `folder` holds the scene file, `binary` is the binary chunk of a `.glb`.
-pub(super) fn read_all(root: &Root, folder: &Path, binary: Option<Vec<u8>>, budget: &Budget) -> Check<Vec<Vec<u8>>> {
+pub(super) fn read_all(
+    root: &Root,
+    folder: &Path,
+    binary: Option<Vec<u8>>,
+    budget: &Budget,
+    warnings: &mut Warnings,
+) -> Check<Vec<Vec<u8>>> {
     // Before any is read: a small file can name a large one a thousand times.
     let total = root
         .buffers
@@ -34,14 +43,17 @@ pub(super) fn read_all(root: &Root, folder: &Path, binary: Option<Vec<u8>>, budg
     for (index, buffer) in root.buffers.iter().enumerate() {
         // Only the first buffer may lack a URI, and then it is the binary chunk.
         let binary = binary.take();
-        let bytes = read(buffer, folder, binary)
-            .map_err(|what| format!("{}: {what}", label("buffer", index, buffer.name.as_deref())))?;
+        let label = || label("buffer", index, buffer.name.as_deref());
+        let bytes = read(buffer, folder, binary, |line| {
+            warnings.push(format!("{}: {line}", label()))
+        })
+        .map_err(|what| format!("{}: {what}", label()))?;
         buffers.push(bytes);
     }
     Ok(buffers)
 }
 
-fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8>> {
+fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>, warn: impl FnOnce(String)) -> Check<Vec<u8>> {
     let length = buffer.byte_length.0;
     if buffer.uri.is_none() && binary.is_none() && meshopt::is_fallback(buffer) {
         return Ok(Vec::new());
@@ -59,14 +71,21 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>) -> Check<Vec<u8
             }
         },
     };
-    if (bytes.len() as u64) < length {
+    let missing = length.saturating_sub(bytes.len() as u64);
+    if (1..=MOST_PADDING).contains(&missing) {
+        warn(format!(
+            "its byteLength is {length}, but {source} has {} bytes; what is missing is taken for padding, and the picture is \
+             right",
+            bytes.len()
+        ));
+    } else if missing > 0 {
         return Err(damaged(format_args!(
             "its byteLength is {length}, but {source} has {} bytes",
             bytes.len()
         )));
     }
     // What follows is padding.
-    bytes.truncate(length as usize);
+    bytes.resize(length as usize, 0);
     Ok(bytes)
 }
 

@@ -72,7 +72,7 @@ impl Document {
             bytes
         });
         let folder = path.parent().unwrap_or(Path::new(""));
-        let buffers = buffer::read_all(&root, folder, binary, &budget)?;
+        let buffers = buffer::read_all(&root, folder, binary, &budget, warnings)?;
         let decoded_views = meshopt::decode_views(&root, &buffers, &budget)?;
         let mut extensions = root.extensions_used.iter().chain(&root.extensions_required);
         let is_quantized = extensions.any(|extension| extension == QUANTIZATION);

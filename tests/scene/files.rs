@@ -302,6 +302,16 @@ fn a_version_that_is_a_number_and_a_value_of_a_wrong_type_are_named_with_their_p
 }
 
 #[test]
+fn padding_that_is_counted_but_not_there_is_told() {
+    let mut room = Fixture::room();
+    let length = room.binary.len();
+    room.set("/buffers/0/byteLength", json!(length + 3));
+    room.assert_warns(&["buffer 0", "padding"]);
+    room.set("/buffers/0/byteLength", json!(length + 4));
+    room.assert_fails(&["buffer 0", "byteLength"]);
+}
+
+#[test]
 fn json_that_ends_in_nul_characters_loads_with_a_warning() {
     let room = Fixture::room();
     room.scene();
