@@ -10,6 +10,7 @@ use super::budget::Budget;
 use super::buffer::read_uri;
 use super::diagnostic::{Check, damaged};
 use super::document::Document;
+use super::ktx2::{self, Ktx2};
 
 /// Longest side of an image, in texels: sides are stored as 16 bits.
 const LONGEST_SIDE: u32 = 32_768;
@@ -17,7 +18,6 @@ const LONGEST_SIDE: u32 = 32_768;
 const BESIDE_PIXELS: u64 = 64 << 20;
 /// What decoding may take beside the result, in bytes for each texel: 16-bit channels, and rows of filters.
 const MEMORY_A_TEXEL: u64 = 16;
-
 /// What decoding takes in fact: the pixels as the file has them, and a copy.
 const DECODING_A_TEXEL: u64 = 8;
 
@@ -57,34 +57,61 @@ impl Pixels {
     }
 
     fn decode(bytes: &[u8], budget: &Budget) -> Check<Self> {
-        let unreadable = |error| format!("it can't be decoded ({error}); export it as PNG or JPEG");
+        if ktx2::is_ktx2(bytes) {
+            let picture = Ktx2::open(bytes)?;
+            take(picture.size, budget)?;
+            let [width, height] = picture.size;
+            return Ok(Self {
+                width,
+                height,
+                rgba: texels(&picture.decode()?),
+            });
+        }
+        let unreadable = |error| format!("it can't be decoded ({error}); export it as PNG, JPEG, WebP or KTX 2.0");
         let format = match image::guess_format(bytes) {
-            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
-            Ok(other) => return Err(format!("it is {other:?}, but only PNG and JPEG are read; convert it")),
-            Err(_) => return Err("it is neither PNG nor JPEG; convert it".into()),
+            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) => format,
+            Ok(other) => {
+                return Err(format!(
+                    "it is {other:?}, but only PNG, JPEG, WebP and KTX 2.0 are read; convert it"
+                ));
+            }
+            Err(_) => return Err("it is none of PNG, JPEG, WebP and KTX 2.0; convert it".into()),
         };
         let reader = || ImageReader::with_format(Cursor::new(bytes), format);
-        // A few bytes can claim to be any number of texels: ask before there is memory for them.
         let (width, height) = reader().into_dimensions().map_err(unreadable)?;
-        let texels = u64::from(width) * u64::from(height);
-        if width.max(height) > LONGEST_SIDE {
-            return Err(format!(
-                "it has {width}x{height} texels, more than the {LONGEST_SIDE} along a side that are read; make it smaller"
-            ));
-        }
-        let kept = size_of::<u32>() as u64 * texels;
-        let what = format!("an image of {width}x{height} texels");
-        budget.check(kept + DECODING_A_TEXEL * texels, &what)?;
-        budget.take(kept, &what)?;
+        let texels_of_all = take([width, height], budget)?;
         let mut limits = Limits::default();
-        limits.max_alloc = Some(MEMORY_A_TEXEL * texels + (1 << 20));
+        limits.max_alloc = Some(MEMORY_A_TEXEL * texels_of_all + (1 << 20));
         let mut reader = reader();
         reader.limits(limits);
         let decoded = reader.decode().map_err(unreadable)?.into_rgba8();
         Ok(Self {
             width,
             height,
-            rgba: decoded.into_raw().as_chunks::<4>().0.to_vec(),
+            rgba: texels(&decoded),
         })
     }
+}
+
+/// Number of texels of an image, whose memory is taken. A few bytes can claim to be any number of texels: this asks before there
+/// is memory for them.
+fn take([width, height]: [u32; 2], budget: &Budget) -> Check<u64> {
+    let texels = u64::from(width) * u64::from(height);
+    if texels == 0 {
+        return Err(damaged("it has no texels"));
+    }
+    if width.max(height) > LONGEST_SIDE {
+        return Err(format!(
+            "it has {width}x{height} texels, more than the {LONGEST_SIDE} along a side that are read; make it smaller"
+        ));
+    }
+    let kept = size_of::<u32>() as u64 * texels;
+    let what = format!("an image of {width}x{height} texels");
+    budget.check(kept + DECODING_A_TEXEL * texels, &what)?;
+    budget.take(kept, &what)?;
+    Ok(texels)
+}
+
+fn texels(rgba: &[u8]) -> Vec<[u8; 4]> {
+    rgba.as_chunks::<4>().0.to_vec()
 }

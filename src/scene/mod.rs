@@ -26,6 +26,7 @@ mod graph;
 mod image;
 mod instance;
 mod json;
+mod ktx2;
 mod light;
 mod light_sources;
 mod light_table;

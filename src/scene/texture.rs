@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use glam::{DVec2, DVec4, dvec4};
+use gltf::json;
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::texture::{MagFilter, WrappingMode};
 use gltf::json::validation::Checked;
@@ -11,7 +12,11 @@ use gltf::json::validation::Checked;
 use super::diagnostic::{Check, damaged, label, list};
 use super::document::Document;
 use super::image::Pixels;
+use super::ktx2;
 use crate::layout::{CLAMP, MIRROR_REPEAT, NEAREST, REPEAT, SECOND_SET, SRGB, TextureLookup, WRAP_U, WRAP_V};
+
+/// Allows textures to be WebP.
+pub(super) const WEBP: &str = "EXT_texture_webp";
 
 /// Source of a texture that names no image.
 const NO_SOURCE: usize = u32::MAX as usize;
@@ -73,48 +78,7 @@ impl<'a> TextureReader<'a> {
                 textures.len()
             ))
         })?;
-        let index = texture.source.value();
-        if index == NO_SOURCE {
-            let extensions = texture
-                .extensions
-                .as_ref()
-                .map(|extensions| extensions.others.keys().cloned().collect());
-            let extensions: Vec<String> = extensions.unwrap_or_default();
-            warnings.push(format!(
-                "texture {} has no image but by {}, which isn't supported; it is left out",
-                wanted.texture,
-                if extensions.is_empty() {
-                    "nothing".to_owned()
-                } else {
-                    list(&extensions)
-                }
-            ));
-            return Ok(None);
-        }
-        let image = root.images.get(index).ok_or_else(|| {
-            damaged(format_args!(
-                "there is no image {index}, the file has {}",
-                root.images.len()
-            ))
-        })?;
-        let place = match self.images.get(&index) {
-            Some(place) => *place,
-            None => {
-                let label = label("image", index, image.name.as_deref());
-                let place = match Pixels::read(self.document, image, self.folder) {
-                    Ok(pixels) => Some(self.add(&pixels)),
-                    Err(what) => {
-                        warnings.push(format!(
-                            "{label}: {what}; its textures are left out, and materials have their factors alone"
-                        ));
-                        None
-                    }
-                };
-                self.images.insert(index, place);
-                place
-            }
-        };
-        let Some([first_texel, size]) = place else {
+        let Some([first_texel, size]) = self.image(wanted.texture, texture, warnings)? else {
             return Ok(None);
         };
         let sampler = texture.sampler.map(|sampler| {
@@ -167,6 +131,56 @@ impl<'a> TextureReader<'a> {
 }
 
 impl TextureReader<'_> {
+    /// First texel and size of the image of a texture: the first one that can be read of those that it names.
+    fn image(&mut self, index: usize, texture: &json::Texture, warnings: &mut Vec<String>) -> Check<Option<[u32; 2]>> {
+        let images = &self.document.root.images;
+        let named = sources(texture);
+        if named.is_empty() {
+            let extensions = texture.extensions.as_ref();
+            let extensions: Vec<String> =
+                extensions.map_or(Vec::new(), |extensions| extensions.others.keys().cloned().collect());
+            warnings.push(format!(
+                "texture {index} has no image but by {}, which isn't supported; it is left out",
+                if extensions.is_empty() {
+                    "nothing".to_owned()
+                } else {
+                    list(&extensions)
+                }
+            ));
+        }
+        for (place, &source) in named.iter().enumerate() {
+            let image = images.get(source).ok_or_else(|| {
+                damaged(format_args!(
+                    "there is no image {source}, the file has {}",
+                    images.len()
+                ))
+            })?;
+            if let Some(known) = self.images.get(&source) {
+                if known.is_some() {
+                    return Ok(*known);
+                }
+                continue;
+            }
+            match Pixels::read(self.document, image, self.folder) {
+                Ok(pixels) => {
+                    let added = Some(self.add(&pixels));
+                    self.images.insert(source, added);
+                    return Ok(added);
+                }
+                Err(what) => {
+                    self.images.insert(source, None);
+                    let instead = match named.get(place + 1) {
+                        Some(fallback) => format!("image {fallback} stands for it"),
+                        None => "its textures are left out, and materials have their factors alone".to_owned(),
+                    };
+                    let label = label("image", source, image.name.as_deref());
+                    warnings.push(format!("{label}: {what}; {instead}"));
+                }
+            }
+        }
+        Ok(None)
+    }
+
     /// Adds an image; returns its first texel and its size.
     fn add(&mut self, pixels: &Pixels) -> [u32; 2] {
         let texels = &mut self.textures.texels;
@@ -174,6 +188,21 @@ impl TextureReader<'_> {
         texels.extend(pixels.rgba.iter().map(|rgba| u32::from_le_bytes(*rgba)));
         [first, pixels.width | pixels.height << 16]
     }
+}
+
+/// The images that a texture names, each to stand for those before it: what extensions name is better than what is there for
+/// programs that don't know them.
+fn sources(texture: &json::Texture) -> Vec<usize> {
+    let extensions = texture.extensions.as_ref();
+    let of_extension = |name| {
+        let source = extensions?.others.get(name)?.get("source")?.as_u64()?;
+        Some(usize::try_from(source).unwrap_or(NO_SOURCE))
+    };
+    let plain = Some(texture.source.value()).filter(|&source| source != NO_SOURCE);
+    [of_extension(WEBP), of_extension(ktx2::EXTENSION), plain]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// KHR_texture_transform: offset · rotation · scale.

@@ -390,10 +390,10 @@ fn unknown_extensions_are_named_and_refused_where_required() {
 #[test]
 fn a_required_extension_is_named_even_if_it_changes_the_format() {
     let mut room = Fixture::room();
-    room.set("/extensionsRequired", json!(["KHR_texture_basisu"]));
+    room.set("/extensionsRequired", json!(["MSFT_texture_dds"]));
     room.set(
         "/textures",
-        json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]),
+        json!([{"extensions": {"MSFT_texture_dds": {"source": 0}}}]),
     );
-    room.assert_fails(&["KHR_texture_basisu"]);
+    room.assert_fails(&["MSFT_texture_dds"]);
 }

@@ -20,6 +20,24 @@ fn two_texels() -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(png.into_inner()))
 }
 
+/// The same texels as WebP, without loss.
+pub fn webp() -> String {
+    let mut webp = std::io::Cursor::new(Vec::new());
+    image::RgbaImage::from_vec(2, 1, vec![255, 0, 0, 255, 0, 255, 0, 128])
+        .expect("two texels")
+        .write_to(&mut webp, image::ImageFormat::WebP)
+        .expect("a WebP");
+    format!("data:image/webp;base64,{}", STANDARD.encode(webp.into_inner()))
+}
+
+/// Four squares of 4×4 texels, red, green, blue and white, by Basis Universal's encoder.
+pub const KTX2: [(&str, &[u8]); 4] = [
+    ("ETC1S", include_bytes!("ktx2/etc1s.ktx2")),
+    ("ETC1S with alpha", include_bytes!("ktx2/etc1s-alpha.ktx2")),
+    ("UASTC", include_bytes!("ktx2/uastc.ktx2")),
+    ("UASTC, mip levels, Zstandard", include_bytes!("ktx2/uastc-zstd.ktx2")),
+];
+
 /// The room with a floor of this material and one texture, of two texels.
 fn textured(material: Value) -> Fixture {
     let mut room = Fixture::room();
@@ -97,11 +115,11 @@ fn images_that_cannot_be_read_are_told_and_left_out() {
         (json!({"uri": "absent.png"}), ["absent.png", "left out"]),
         (
             json!({"uri": "data:image/webp;base64,UklGRhAAAABXRUJQVlA4TAAAAAA="}),
-            ["PNG", "left out"],
+            ["can't be decoded", "left out"],
         ),
         (
             json!({"uri": "data:;base64,AAAA"}),
-            ["neither PNG nor JPEG", "left out"],
+            ["none of PNG, JPEG, WebP and KTX 2.0", "left out"],
         ),
         (json!({}), ["neither a uri nor a bufferView", "left out"]),
     ] {
@@ -113,9 +131,94 @@ fn images_that_cannot_be_read_are_told_and_left_out() {
     let mut room = textured(floor());
     room.set(
         "/textures/0",
-        json!({"extensions": {"KHR_texture_basisu": {"source": 0}}}),
+        json!({"extensions": {"MSFT_texture_dds": {"source": 0}}}),
     );
-    room.assert_warns(&["texture 0", "KHR_texture_basisu", "left out"]);
+    room.assert_warns(&["texture 0", "MSFT_texture_dds", "left out"]);
+}
+
+/// A room whose floor's texture is an image by an extension, which it requires, with the PNG to stand for it or not.
+fn textured_by(extension: &str, uri: &str, has_fallback: bool) -> Fixture {
+    let mut room = textured(with_base_color(json!({"index": 0})));
+    let source = json!({extension: {"source": 1}});
+    room.set("/images/-", json!({"uri": uri}));
+    room.set("/textures/0", json!({"source": 0, "extensions": source}));
+    room.set("/extensionsUsed", json!([extension]));
+    if !has_fallback {
+        room.remove("/textures/0/source");
+        room.set("/extensionsRequired", json!([extension]));
+    }
+    room
+}
+
+#[test]
+fn webp_is_read_before_what_stands_for_it() {
+    let plain = textured(with_base_color(json!({"index": 0}))).scene();
+    for has_fallback in [true, false] {
+        let scene = textured_by("EXT_texture_webp", &webp(), has_fallback).scene();
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        assert_eq!(scene.textures, plain.textures);
+    }
+    // The PNG is another picture here: what is looked up is the WebP.
+    let mut room = textured_by("EXT_texture_webp", &webp(), true);
+    room.set("/images/0", json!({"uri": "absent.png"}));
+    assert_eq!(room.scene().textures, plain.textures);
+}
+
+#[test]
+fn ktx2_is_transcoded() {
+    for (name, bytes) in KTX2 {
+        let uri = format!("data:image/ktx2;base64,{}", STANDARD.encode(bytes));
+        let scene = textured_by("KHR_texture_basisu", &uri, false).scene();
+        assert!(scene.warnings.is_empty(), "{name}: {:?}", scene.warnings);
+        assert_eq!(scene.textures.texels.len(), 64, "{name}");
+        for (place, wanted) in [
+            (0, [255, 0, 0]),
+            (7, [0, 255, 0]),
+            (56, [0, 0, 255]),
+            (63, [255, 255, 255]),
+        ] {
+            let [r, g, b, alpha] = scene.textures.texels[place].to_le_bytes();
+            let far = [r, g, b]
+                .iter()
+                .zip(wanted)
+                .any(|(&found, wanted)| found.abs_diff(wanted) > 8);
+            assert!(!far && alpha == 255, "{name}, texel {place}: {:?}", [r, g, b, alpha]);
+        }
+    }
+}
+
+#[test]
+fn what_stands_for_an_unreadable_image_is_used_and_that_is_said() {
+    let plain = textured(with_base_color(json!({"index": 0}))).scene();
+    for (extension, bytes) in [
+        ("EXT_texture_webp", "AAAA"),
+        ("KHR_texture_basisu", "q0tUWCAyMLsNChoKAAAA"),
+    ] {
+        let uri = format!("data:;base64,{bytes}");
+        let scene = textured_by(extension, &uri, true).assert_warns(&["image 1", "image 0 stands for it"]);
+        assert_eq!(scene.textures, plain.textures);
+        let scene = textured_by(extension, &uri, false).assert_warns(&["image 1", "left out"]);
+        assert_eq!(scene.materials[0].textures.base_color, None);
+    }
+}
+
+#[test]
+fn ktx2_that_claims_too_much_is_refused_before_memory_is_asked_for() {
+    let mut room = textured_by("KHR_texture_basisu", "", false);
+    for (at, value, part) in [
+        (20, 40_000u32, "40000x"),
+        (28, 4, "of one face and layer"),
+        (36, 6, "of one face and layer"),
+        (52, u32::MAX, "of one face and layer"),
+        (80, u32::MAX, "of one face and layer"),
+        (96, u32::MAX, "of one face and layer"),
+    ] {
+        let mut bytes = KTX2[2].1.to_vec();
+        bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        let uri = format!("data:image/ktx2;base64,{}", STANDARD.encode(bytes));
+        room.set("/images/1/uri", json!(uri));
+        room.assert_warns(&["image 1", part, "left out"]);
+    }
 }
 
 #[test]
