@@ -26,6 +26,8 @@ mod fixture;
 mod geometry;
 #[path = "scene/hierarchy.rs"]
 mod hierarchy;
+#[path = "scene/instancing.rs"]
+mod instancing;
 #[path = "scene/lights.rs"]
 mod lights;
 #[path = "scene/materials.rs"]

@@ -64,6 +64,12 @@ pub(super) const FRACTIONS: Formats = Formats {
     quantized: &[],
 };
 
+/// What instances of a node give rotations as.
+pub(super) const INSTANCE_ROTATIONS: Formats = Formats {
+    core: &[Format::plain(F32), Format::normalized(I8), Format::normalized(I16)],
+    quantized: &[],
+};
+
 /// What animations give rotations and weights as.
 pub(super) const ANIMATED_FRACTIONS: Formats = Formats {
     core: &[

@@ -17,6 +17,7 @@ use super::document::Document;
 use super::facet::face_normal;
 use super::graph::{PlacedNode, node_label};
 use super::instance::Instance;
+use super::instancing;
 use super::morph;
 use super::primitive::{Primitive, primitive_label};
 use super::sharing;
@@ -26,7 +27,7 @@ use super::skin::Skins;
 const MAX_TRIANGLES: usize = 1 << 25;
 
 /// The most primitives of all nodes together.
-const MAX_OBJECTS: usize = 1 << 20;
+pub(super) const MAX_OBJECTS: usize = 1 << 20;
 
 /// The most morph targets and sets of joints of all triangles together.
 const MAX_DEFORMATIONS: usize = 1 << 28;
@@ -57,8 +58,18 @@ pub(super) fn instances<'a>(
                 meshes.len()
             ))
         })?;
+        let at_node = |what| format!("{}: {what}", node_label(&document.root, placed.index));
+        let places = if placed.node.skin.is_some() && instancing::extension(placed).is_some() {
+            warnings.push(at_node(format!(
+                "it has a skin, which puts its mesh in one place; its {} is ignored",
+                instancing::EXTENSION
+            )));
+            vec![placed.to_world]
+        } else {
+            instancing::places(document, placed).map_err(at_node)?
+        };
         for (primitive_index, primitive) in mesh.primitives.iter().enumerate() {
-            primitives += 1;
+            primitives += places.len();
             if primitives > MAX_OBJECTS {
                 return Err(format!(
                     "its nodes show more than {MAX_OBJECTS} mesh primitives; join meshes or split the scene"
@@ -76,14 +87,16 @@ pub(super) fn instances<'a>(
             let Some(primitive) = opened else {
                 continue;
             };
-            triangles += primitive.triangle_count();
+            triangles = places
+                .len()
+                .saturating_mul(primitive.triangle_count())
+                .saturating_add(triangles);
             if triangles > MAX_TRIANGLES {
                 return Err(format!(
                     "its nodes show more than {MAX_TRIANGLES} triangles; simplify or split the scene"
                 ));
             }
             let attributes = &primitive.attributes;
-            let at_node = |what| format!("{}: {what}", node_label(&document.root, placed.index));
             if placed.node.skin.is_some() && !attributes.is_skinned() {
                 let label = primitive_label(mesh_index, mesh, primitive_index);
                 warnings.push(format!(
@@ -94,7 +107,7 @@ pub(super) fn instances<'a>(
             let morph = morph::weights(placed, pose, mesh.weights.as_deref(), targets).map_err(at_node)?;
             let skin = placed.node.skin.map(|skin| skins.matrices(skin.value()));
             let skin = skin.transpose().map_err(at_node)?;
-            let shifts = morph.len() + attributes.influence_sets();
+            let shifts = places.len().saturating_mul(morph.len() + attributes.influence_sets());
             deformations = deformations.saturating_add(shifts.saturating_mul(primitive.triangle_count()));
             if deformations > MAX_DEFORMATIONS {
                 return Err(format!(
@@ -102,14 +115,17 @@ pub(super) fn instances<'a>(
                      apply them before exporting, or split the scene"
                 ));
             }
-            instances.push(Instance::new(
-                placed,
-                mesh_index,
-                primitive_index,
-                primitive.clone(),
-                morph,
-                skin,
-            ));
+            instances.extend(places.iter().map(|&to_world| {
+                Instance::new(
+                    placed,
+                    to_world,
+                    mesh_index,
+                    primitive_index,
+                    primitive.clone(),
+                    morph.clone(),
+                    skin.clone(),
+                )
+            }));
         }
     }
     Ok(instances)

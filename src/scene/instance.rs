@@ -71,9 +71,10 @@ pub(super) struct Corner {
 }
 
 impl<'a> Instance<'a> {
-    /// The primitive as `node` shows it, with the skin's matrices if the node has a skin.
+    /// The primitive as `node` shows it at a place in the world, or else by the skin's matrices if the node has a skin.
     pub(super) fn new(
         node: &'a PlacedNode<'a>,
+        to_world: DAffine3,
         mesh: usize,
         primitive_index: usize,
         primitive: Rc<Primitive<'a>>,
@@ -82,7 +83,7 @@ impl<'a> Instance<'a> {
     ) -> Self {
         let placement = match skin {
             Some(matrices) if primitive.attributes.is_skinned() => Placement::Skin(matrices),
-            _ => Placement::Node(Map::new(node.to_world)),
+            _ => Placement::Node(Map::new(to_world)),
         };
         Self {
             node,

@@ -25,6 +25,7 @@ mod glb;
 mod graph;
 mod image;
 mod instance;
+mod instancing;
 mod json;
 mod ktx2;
 mod light;
