@@ -691,6 +691,80 @@ fn lists_go_to_stdout() {
     }
 }
 
+/// A file of two scenes, hall and attic, and two variants of a plate that glows, in a folder.
+fn write_choices(folder: &Path) -> PathBuf {
+    let file = folder.join("choices.gltf");
+    let corners: [f32; 9] = [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0];
+    let bytes: String = corners
+        .iter()
+        .flat_map(|value| value.to_le_bytes())
+        .map(|byte| format!("%{byte:02x}"))
+        .collect();
+    let json = serde_json::json!({
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_materials_variants"],
+        "extensions": {"KHR_materials_variants": {"variants": [{"name": "red"}, {"name": "blue"}]}},
+        "scene": 0,
+        "scenes": [{"name": "hall", "nodes": [0]}, {"name": "attic", "nodes": [1]}],
+        "nodes": [{"mesh": 0}, {"mesh": 0, "scale": [2, 2, 2]}],
+        "meshes": [{"primitives": [{
+            "attributes": {"POSITION": 0}, "material": 0,
+            "extensions": {"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [1]}]}}
+        }]}],
+        "materials": [{"emissiveFactor": [1, 0, 0]}, {"emissiveFactor": [0, 0, 1]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"uri": format!("data:,{bytes}"), "byteLength": 36}]
+    });
+    std::fs::write(&file, json.to_string()).expect("a scene");
+    file
+}
+
+#[test]
+fn a_variant_and_a_scene_are_chosen_by_name() {
+    let folder = TempDir::new().expect("folder");
+    let scene = write_choices(folder.path());
+    let centre = |more: &[&str]| {
+        let output = small_render(folder.path(), &scene, &[more, &["-o", "out.exr"]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let image = ppm_vk::film::read_exr(&folder.path().join("out.exr")).expect("picture");
+        let middle = image.pixels()[image.height() / 2 * image.width() + image.width() / 2];
+        (middle, stderr(&output))
+    };
+    let (red, text) = centre(&[]);
+    assert!(red[0] > 0.5 && red[2] == 0.0, "{red:?}");
+    let note = text
+        .lines()
+        .find(|line| line.contains("--scene-name"))
+        .unwrap_or_default();
+    assert!(
+        note.starts_with("scene 0 \"hall\" is rendered") && note.contains("1 \"attic\""),
+        "{text}"
+    );
+    let (blue, text) = centre(&["--variant", "blue", "--scene-name", "attic"]);
+    assert!(blue[2] > 0.5 && blue[0] == 0.0, "{blue:?}");
+    assert!(!text.contains("--scene-name") && !text.contains("variant"), "{text}");
+    for (arguments, words) in [
+        (["--variant", "green"], ["\"green\"", "\"red\" and \"blue\""]),
+        (["--scene-name", "2"], ["no scene \"2\"", "0 \"hall\" and 1 \"attic\""]),
+    ] {
+        let _ = std::fs::remove_file(folder.path().join("out.exr"));
+        let output = small_render(folder.path(), &scene, &arguments);
+        assert_eq!(output.status.code(), Some(1));
+        let text = stderr(&output);
+        assert!(
+            text.lines().count() == 1 && words.iter().all(|word| text.contains(word)),
+            "{text}"
+        );
+    }
+    let scene = scene.to_str().expect("UTF-8");
+    let output = ppm_vk(folder.path(), &["inspect", scene, "--variant", "blue"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    for line in ["variant      red", "variant      blue", "note         scene 0"] {
+        assert!(text.contains(line), "{text}");
+    }
+}
+
 /// A picture of 2 × 1 pixels in the Radiance format: both channels' mantissas and a shared exponent.
 fn write_hdr(file: &Path, pixels: [[u8; 4]; 2]) {
     let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n".to_vec();

@@ -12,6 +12,8 @@ mod assets;
 mod attributes;
 #[path = "scene/cameras.rs"]
 mod cameras;
+#[path = "scene/choices.rs"]
+mod choices;
 #[path = "scene/compressed.rs"]
 mod compressed;
 #[path = "scene/damaged.rs"]

@@ -92,6 +92,8 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
             "punctual_lights": scene.lights.len(),
             "environment": scene.environment.is_some(),
             "cameras": scene.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
+            "variants": scene.variants,
+            "notes": scene.notes,
             "features": packed.features.names(),
             "bounds": { "min": low.to_array(), "max": high.to_array() },
             "device_memory": memory.map(|(memory, config)| json!({
@@ -143,6 +145,9 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     for (index, camera) in scene.cameras.iter().enumerate() {
         writeln!(text, "camera {index:<5} {}", escaped(&camera.name))?;
     }
+    for variant in &scene.variants {
+        writeln!(text, "variant      {variant}")?;
+    }
     let features = packed.features.names();
     writeln!(
         text,
@@ -170,6 +175,9 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
             mebibytes(memory.scene),
             mebibytes(memory.render)
         )?;
+    }
+    for note in &scene.notes {
+        writeln!(text, "note         {note}")?;
     }
     for warning in &scene.warnings {
         writeln!(text, "warning      {warning}")?;

@@ -43,6 +43,9 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let mut inputs = arguments.read.inputs(path);
     inputs.extend(scene.files.iter().map(PathBuf::as_path));
     check_outputs(&inputs, outputs(arguments, &output))?;
+    for note in &scene.notes {
+        say!("{note}");
+    }
     for warning in &scene.warnings {
         say!("warning: {warning}");
     }

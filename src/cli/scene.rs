@@ -23,6 +23,12 @@ pub struct SceneArguments {
     /// [default: 2].
     #[arg(long, value_name = "GIB", allow_negative_numbers = true, value_parser = positive)]
     memory_limit: Option<f64>,
+    /// Materials of this variant (ppm-vk inspect lists a scene's) [default: each mesh's own].
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
+    /// Scene of a file that has several [default: the file's default scene, or the first that shows a mesh].
+    #[arg(long, value_name = "NAME|INDEX")]
+    scene_name: Option<String>,
 }
 
 /// What `--environment` asks for.
@@ -58,6 +64,8 @@ impl SceneArguments {
             frame_time: self.frame_time,
             environment,
             memory_limit: Some(memory_limit),
+            variant: self.variant.clone(),
+            scene: self.scene_name.clone(),
         };
         Ok(while_showing(READING, quiet, || Scene::load_with(path, options))?)
     }

@@ -14,7 +14,7 @@ use serde_json::Value;
 use super::budget::Budget;
 use super::buffer::{self, slice};
 use super::diagnostic::{Check, Warnings, damaged, quote};
-use super::{coat, glb, instancing, json, ktx2, meshopt, texture};
+use super::{coat, glb, instancing, json, ktx2, meshopt, texture, variants};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
@@ -34,6 +34,7 @@ pub(super) const SUPPORTED_EXTENSIONS: &[&str] = &[
     ktx2::EXTENSION,
     meshopt::EXTENSION,
     texture::WEBP,
+    variants::EXTENSION,
 ];
 
 /// The largest file that is read, in bytes: what a `.glb` header can express.

@@ -5,6 +5,7 @@ use gltf::json::{Node, Root};
 
 use super::animation::{NodePose, Pose};
 use super::diagnostic::{Check, damaged, label};
+use super::scenes;
 
 /// How far the last row of a node's matrix may be from 0 0 0 1.
 const AFFINE_TOLERANCE: f64 = 1e-5;
@@ -21,13 +22,19 @@ pub(super) struct PlacedNode<'a> {
     pub unscaled_to_world: DAffine3,
 }
 
-/// Every node of the default scene, parents before children, in the file's order of depth first.
+/// Every node of a scene, as [`scenes::choose`] has it, parents before children, in the file's order of depth first.
 ///
-/// Without a default scene the first one is taken, and without any scene all nodes that have no parent.
-pub(super) fn place_nodes<'a>(root: &'a Root, pose: &Pose<'_>) -> Check<Vec<PlacedNode<'a>>> {
-    let has_parent = check_forest(root)?;
+/// Without any scene all nodes that have no parent.
+pub(super) fn place_nodes<'a>(
+    root: &'a Root,
+    pose: &Pose<'_>,
+    scene: Option<&str>,
+    notes: &mut Vec<String>,
+) -> Check<Vec<PlacedNode<'a>>> {
+    let parents = check_forest(root)?;
+    let scene = scenes::choose(root, &parents, scene, notes)?;
     // The last of the stack is next: siblings are pushed in reverse. Recursion would overflow on a long chain.
-    let mut stack: Vec<(usize, DAffine3)> = scene_roots(root, &has_parent)?
+    let mut stack: Vec<(usize, DAffine3)> = scene_roots(root, &parents, scene)?
         .into_iter()
         .rev()
         .map(|index| (index, DAffine3::IDENTITY))
@@ -65,8 +72,8 @@ pub(super) fn node_label(root: &Root, index: usize) -> String {
 
 /// Checks that the nodes form trees: children exist, none has two parents, and there is no cycle.
 ///
-/// Returns which nodes have a parent.
-fn check_forest(root: &Root) -> Check<Vec<bool>> {
+/// Returns the parent of each node that has one.
+fn check_forest(root: &Root) -> Check<Vec<Option<usize>>> {
     let mut parents: Vec<Option<usize>> = vec![None; root.nodes.len()];
     for (index, node) in root.nodes.iter().enumerate() {
         for child in node.children.iter().flatten() {
@@ -100,26 +107,20 @@ fn check_forest(root: &Root) -> Check<Vec<bool>> {
             node_label(root, index)
         )));
     }
-    Ok(parents.iter().map(Option::is_some).collect())
+    Ok(parents)
 }
 
-fn scene_roots(root: &Root, has_parent: &[bool]) -> Check<Vec<usize>> {
-    let index = root.scene.map_or(0, |scene| scene.value());
-    let Some(scene) = root.scenes.get(index) else {
-        if root.scene.is_some() {
-            return Err(damaged(format_args!(
-                "its default scene is {index}, but it has {} scenes",
-                root.scenes.len()
-            )));
-        }
-        return Ok((0..root.nodes.len()).filter(|&node| !has_parent[node]).collect());
+fn scene_roots(root: &Root, parents: &[Option<usize>], scene: Option<usize>) -> Check<Vec<usize>> {
+    let Some(index) = scene else {
+        return Ok((0..root.nodes.len()).filter(|&node| parents[node].is_none()).collect());
     };
+    let scene = &root.scenes[index];
     let mut listed = vec![false; root.nodes.len()];
     for node in &scene.nodes {
         let fault = match listed.get_mut(node.value()) {
             None => format!("but the file has {} nodes", root.nodes.len()),
             Some(true) => "twice".to_owned(),
-            Some(_) if has_parent[node.value()] => "which is the child of another node".to_owned(),
+            Some(_) if parents[node.value()].is_some() => "which is the child of another node".to_owned(),
             Some(listed) => {
                 *listed = true;
                 continue;

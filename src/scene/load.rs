@@ -7,12 +7,12 @@ use glam::Vec3;
 use super::animation::Pose;
 use super::budget::MEMORY_LIMIT;
 use super::buffer::referred_files;
-use super::diagnostic::{Check, Warnings, quote};
+use super::diagnostic::{Check, Warnings, quote, shorten};
 use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::graph::place_nodes;
 use super::punctual::punctual_lights;
 use super::texture::TextureReader;
-use super::{Environment, Scene, Surface, camera, geometry, material};
+use super::{Environment, Scene, Surface, camera, geometry, material, variants};
 use crate::error::{Error, Result};
 
 /// What a scene is loaded with.
@@ -25,6 +25,10 @@ pub struct LoadOptions {
     pub environment: Option<Environment>,
     /// Bytes that the scene may take as it is read: buffers, images, geometry. `None`: [`MEMORY_LIMIT`].
     pub memory_limit: Option<u64>,
+    /// The material variant (KHR_materials_variants) with that name. `None`: primitives have their own materials.
+    pub variant: Option<String>,
+    /// The scene of the file, by name or index. `None`: its default one.
+    pub scene: Option<String>,
 }
 
 impl Scene {
@@ -52,13 +56,20 @@ impl Scene {
 
 fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     let mut warnings = Warnings::default();
-    let document = Document::read(path, options.memory_limit.unwrap_or(MEMORY_LIMIT), &mut warnings)?;
+    let mut notes = Vec::new();
+    let limit = options.memory_limit.unwrap_or(MEMORY_LIMIT);
+    let mut document = Document::read(path, limit, &mut warnings)?;
+    let variants = variants::names(&document.root)?;
+    if let Some(wanted) = &options.variant {
+        variants::choose(&mut document.root, &variants, wanted)?;
+    }
+    let document = document;
     let root = &document.root;
     let pose = match options.frame_time {
         Some(time) => Pose::at(&document, time, &mut warnings)?,
         None => Pose::default(),
     };
-    let nodes = place_nodes(root, &pose)?;
+    let nodes = place_nodes(root, &pose, options.scene.as_deref(), &mut notes)?;
     warn_of_ignored(&document, &options, &mut warnings);
 
     let instances = geometry::instances(&document, &nodes, &pose, &mut warnings)?;
@@ -101,10 +112,18 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         files: std::iter::once(path.to_owned())
             .chain(referred_files(root, folder))
             .collect(),
+        variants: variants.iter().map(|name| shorten(name)).collect(),
+        notes,
         warnings: Vec::new(),
     };
     if scene.cameras.is_empty() {
-        warnings.push("it has no camera; one that is framed on its bounds is used".into());
+        let elsewhere = root.nodes.iter().any(|node| node.camera.is_some());
+        let of_scene = if elsewhere {
+            "the scene that is rendered has no camera, though the file has"
+        } else {
+            "it has no camera"
+        };
+        warnings.push(format!("{of_scene}; one that is framed on its bounds is used"));
         scene.cameras.push(camera::framed_on(scene.bounds()));
     }
     if scene.environment.is_none() && scene.lights.is_empty() && !scene.has_emissive_triangles() {

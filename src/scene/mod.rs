@@ -42,11 +42,13 @@ mod packed;
 mod placement;
 mod primitive;
 mod punctual;
+mod scenes;
 mod sharing;
 mod skin;
 mod sphere;
 mod tangents;
 mod texture;
+mod variants;
 
 pub use budget::MEMORY_LIMIT;
 pub use features::SceneFeatures;
@@ -332,6 +334,10 @@ pub struct Scene {
     pub dropped_triangles: usize,
     /// The file that it is from, and those that this one refers to.
     pub files: Vec<PathBuf>,
+    /// Names of the file's material variants.
+    pub variants: Vec<String>,
+    /// What was chosen where the file leaves a choice, one line each.
+    pub notes: Vec<String>,
     /// What the file asks for and the renderer doesn't do, one line each.
     pub warnings: Vec<String>,
 }
