@@ -20,6 +20,8 @@ mod compressed;
 mod damaged;
 #[path = "scene/deformation.rs"]
 mod deformation;
+#[path = "scene/draco.rs"]
+mod draco;
 #[path = "scene/files.rs"]
 mod files;
 #[path = "scene/fixture.rs"]

@@ -14,7 +14,7 @@ use serde_json::Value;
 use super::budget::Budget;
 use super::buffer::{self, slice};
 use super::diagnostic::{Check, Warnings, damaged, quote};
-use super::{coat, glb, instancing, json, ktx2, meshopt, texture, variants};
+use super::{coat, draco, glb, instancing, json, ktx2, meshopt, texture, variants};
 
 /// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
 /// `Cargo.toml` turns on.
@@ -30,6 +30,7 @@ pub(super) const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_materials_volume",
     "KHR_texture_transform",
     QUANTIZATION,
+    draco::EXTENSION,
     instancing::EXTENSION,
     ktx2::EXTENSION,
     meshopt::EXTENSION,
@@ -48,6 +49,8 @@ pub(super) struct Document {
     buffers: Vec<Vec<u8>>,
     /// The bytes of the views that are stored compressed.
     decoded_views: HashMap<usize, Vec<u8>>,
+    /// The bytes of the accessors whose data was decompressed, by index: tightly packed elements.
+    pub decompressed: HashMap<usize, Vec<u8>>,
     /// Whether the file uses [`QUANTIZATION`].
     pub is_quantized: bool,
     /// What memory there is for the rest of the scene.
@@ -80,13 +83,16 @@ impl Document {
         let decoded_views = meshopt::decode_views(&root, &buffers, &budget)?;
         let mut extensions = root.extensions_used.iter().chain(&root.extensions_required);
         let is_quantized = extensions.any(|extension| extension == QUANTIZATION);
-        Ok(Self {
+        let mut document = Self {
             root,
             buffers,
             decoded_views,
+            decompressed: HashMap::new(),
             is_quantized,
             budget,
-        })
+        };
+        draco::decompress(&mut document, warnings)?;
+        Ok(document)
     }
 
     /// The bytes of the view at `index`, decoded where they are stored compressed.

@@ -77,18 +77,23 @@ impl<'a> Elements<'a> {
         let fail = |what: String| format!("{}: {what}", label("accessor", index, accessor.name.as_deref()));
 
         let (shape, format) = kind(accessor, shapes, formats).map_err(|what| fail(damaged(what)))?;
-        Self::locate(document, accessor, shape, format).map_err(|what| fail(damaged(what)))
+        Self::locate(document, index, accessor, shape, format).map_err(|what| fail(damaged(what)))
     }
 
-    fn locate(document: &'a Document, accessor: &Accessor, shape: Type, format: Format) -> Check<Self> {
+    fn locate(document: &'a Document, index: usize, accessor: &Accessor, shape: Type, format: Format) -> Check<Self> {
         let width = shape.multiplicity();
         let size = width * format.component.size();
         let count = accessor.count.0;
         let start = accessor.byte_offset.unwrap_or_default().0;
-        let base = accessor
-            .buffer_view
-            .map(|view| Packed::locate(document, view, start, count, size))
-            .transpose()?;
+        let base = match (document.decompressed.get(&index), accessor.buffer_view) {
+            (Some(bytes), _) => Some(Packed {
+                bytes,
+                stride: size,
+                size,
+            }),
+            (None, Some(view)) => Some(Packed::locate(document, view, start, count, size)?),
+            (None, None) => None,
+        };
         if base.is_none() && count > MAX_ZEROS {
             return Err(format!(
                 "it has {count} elements without a bufferView, more than the {MAX_ZEROS} that are read"

@@ -24,7 +24,7 @@ use super::sharing;
 use super::skin::Skins;
 
 /// The most triangles that a scene may have. A few hundred bytes of instances of instances could ask for any number.
-const MAX_TRIANGLES: usize = 1 << 25;
+pub(super) const MAX_TRIANGLES: usize = 1 << 25;
 
 /// The most primitives of all nodes together.
 pub(super) const MAX_OBJECTS: usize = 1 << 20;

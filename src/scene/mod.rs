@@ -16,6 +16,7 @@ mod contact;
 mod curve;
 mod diagnostic;
 mod document;
+mod draco;
 mod elements;
 mod environment;
 mod facet;

@@ -3,7 +3,7 @@
 use glam::Vec4;
 use gltf::json::mesh::Mode;
 use gltf::json::validation::Checked;
-use gltf::json::{Mesh, Root, mesh};
+use gltf::json::{Mesh, mesh};
 
 use super::accessor::Integers;
 use super::attributes::Attributes;
@@ -12,9 +12,6 @@ use super::diagnostic::{Check, Warnings, damaged, label};
 use super::document::Document;
 use super::instance::Corner;
 use super::tangents::{MAX_AROUND, tangents};
-
-/// Compresses meshes.
-const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// A primitive whose accessors were checked. Only its indices and vertices are still to be.
 pub(super) struct Primitive<'a> {
@@ -56,7 +53,6 @@ impl<'a> Primitive<'a> {
             }
             Checked::Invalid => return Err(damaged("its mode is none of 0 to 6")),
         };
-        check_draco(&document.root, primitive)?;
         let Some(attributes) = Attributes::open(document, primitive)? else {
             warnings.push(format!(
                 "{label}: it has no POSITION and is skipped, as other viewers do"
@@ -169,21 +165,4 @@ fn normal_texture_set(document: &Document, material: usize) -> Option<usize> {
     usize::try_from(set.unwrap_or(texture.tex_coord.into()))
         .ok()
         .filter(|&set| set < 2)
-}
-
-/// Data that Draco compressed is passed over where the file has it uncompressed as well, and refused otherwise.
-fn check_draco(root: &Root, primitive: &mesh::Primitive) -> Check<()> {
-    let extensions = primitive.extensions.as_ref();
-    let is_compressed = extensions.is_some_and(|extensions| extensions.others.contains_key(DRACO));
-    let mut accessors = primitive.attributes.values().chain(&primitive.indices);
-    let has_data = accessors.all(|accessor| {
-        let accessor = root.accessors.get(accessor.value());
-        accessor.is_none_or(|accessor| accessor.buffer_view.is_some() || accessor.sparse.is_some())
-    });
-    if is_compressed && !has_data {
-        return Err(format!(
-            "its data is there by {DRACO} alone, which isn't supported; export the scene without compression"
-        ));
-    }
-    Ok(())
 }
