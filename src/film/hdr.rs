@@ -3,8 +3,8 @@
 use super::Image;
 use crate::error::{Error, Result};
 use crate::files;
+use image::ImageDecoder;
 use image::codecs::hdr::HdrDecoder;
-use image::{DynamicImage, ImageDecoder};
 use std::io::BufReader;
 use std::path::Path;
 
@@ -26,8 +26,10 @@ pub fn read_hdr(path: &Path) -> Result<Image> {
             "has no pixels or more than 134 million: damaged, or scale it down first",
         ));
     }
-    let picture = DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgb32f();
-    let pixels = picture.pixels().map(|pixel| pixel.0).collect();
+    let mut pixels = vec![[0.0f32; 3]; width as usize * height as usize];
+    decoder
+        .read_image(bytemuck::cast_slice_mut(&mut pixels))
+        .map_err(damaged)?;
     Ok(Image::new(width as usize, height as usize, pixels))
 }
 

@@ -1,23 +1,20 @@
 //! Pictures as OpenEXR files.
 
+mod read;
+
+pub use read::{exr_pixels, read_exr};
+
 use super::{Image, Metadata, write_whole};
 use crate::error::{Error, Result};
-use crate::files;
-use exr::image::read::image::ReadLayers;
-use exr::image::read::layers::ReadChannels;
-use exr::image::read::specific_channels::ReadSpecificChannel;
 use exr::image::write::WritableImage;
-use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Layer, SpecificChannels};
+use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Layer};
 use exr::math::Vec2;
-use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
-use exr::meta::header::{Header, LayerAttributes};
+use exr::meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text};
+use exr::meta::header::LayerAttributes;
 use exr::prelude::SmallVec;
 use std::collections::HashMap;
-use std::io::{BufReader, Cursor, Read, Seek};
+use std::io::Cursor;
 use std::path::Path;
-
-/// Pictures with more pixels than this (16,384 × 8,192) are taken for damaged files.
-const MAX_PIXELS: usize = 1 << 27;
 
 /// Primaries and white point of Rec. ITU-R BT.709 in CIE xy: what the program means by linear RGB.
 const REC_709: Chromaticities = Chromaticities {
@@ -118,150 +115,15 @@ fn sort_attributes(file: &mut [u8]) {
     header[..sorted.len()].copy_from_slice(&sorted);
 }
 
-/// Reads the first layer with channels R, G and B of an OpenEXR file, or else with luminance Y alone, which is grey; half, float and integer samples become `f32`,
-/// other channels are left out.
-///
-/// The picture is the file's display window: pixels that the data window lacks are black, what lies outside is cut.
-///
-/// # Errors
-/// A file that can't be opened, is damaged or cut short, has no such layer, has subsampled channels, or has more than
-/// 2²⁷ pixels.
-pub fn read_exr(path: &Path) -> Result<Image> {
-    let file = files::open(path)?;
-    decode(BufReader::new(file), path)
-}
-
-/// Pixels of the largest picture in an OpenEXR file, by its headers.
-///
-/// # Errors
-/// A file that can't be opened or isn't OpenEXR.
-pub fn exr_pixels(path: &Path) -> Result<u64> {
-    let reader =
-        exr::block::read(BufReader::new(files::open(path)?), false).map_err(|error| unreadable(path, &error))?;
-    let sizes = |header: &Header| [header.layer_size, header.shared_attributes.display_window.size];
-    let pixels = |Vec2(width, height): Vec2<usize>| (width as u64).saturating_mul(height as u64);
-    Ok(reader.headers().iter().flat_map(sizes).map(pixels).max().unwrap_or(0))
-}
-
-fn unreadable(path: &Path, error: &exr::error::Error) -> Error {
-    Error::file(
-        path,
-        format!("can't be read as OpenEXR ({error}): is it another format, or cut short?"),
-    )
-}
-
-/// Reads the OpenEXR file `source`; errors name it `path`.
-fn decode(source: impl Read + Seek, path: &Path) -> Result<Image> {
-    let damaged = |error: exr::error::Error| unreadable(path, &error);
-    let reader = exr::block::read(source, false).map_err(damaged)?;
-    check_headers(reader.headers()).map_err(|what| Error::file(path, what))?;
-
-    let black = |Vec2(width, height)| Image::new(width, height, vec![[0.0; 3]; width * height]);
-    let levels = || exr::image::read::read().no_deep_data().largest_resolution_level();
-    // A decoder that panics over a damaged file would abort the process from one of rayon's threads.
-    let picture = if is_grey(reader.headers()) {
-        levels()
-            .specific_channels()
-            .required("Y")
-            .collect_pixels(
-                |size, _| black(size),
-                |image, Vec2(x, y), (luminance,): (f32,)| {
-                    image.pixels[y * image.width + x] = [luminance; 3];
-                },
-            )
-            .first_valid_layer()
-            .all_attributes()
-            .non_parallel()
-            .from_chunks(reader)
-            .map(parts)
-    } else {
-        levels()
-            .specific_channels()
-            .required("R")
-            .required("G")
-            .required("B")
-            .collect_pixels(
-                |size, _| black(size),
-                |image, Vec2(x, y), (r, g, b): (f32, f32, f32)| {
-                    image.pixels[y * image.width + x] = [r, g, b];
-                },
-            )
-            .first_valid_layer()
-            .all_attributes()
-            .non_parallel()
-            .from_chunks(reader)
-            .map(parts)
-    };
-    let (image, position, display) = picture.map_err(damaged)?;
-    Ok(crop(image, position, display))
-}
-
-/// The pixels that were read, where they lie, and what of them is to be shown.
-fn parts<C>(picture: exr::image::Image<Layer<SpecificChannels<Image, C>>>) -> (Image, Vec2<i32>, IntegerBounds) {
-    let layer = picture.layer_data;
-    let position = layer.attributes.layer_position;
-    (layer.channel_data.pixels, position, picture.attributes.display_window)
-}
-
-/// Whether luminance alone is all that there is: no layer has colours, and one has luminance without chroma.
-fn is_grey(headers: &[Header]) -> bool {
-    let has = |header: &Header, names: &[&str]| {
-        let channels = &header.channels.list;
-        names
-            .iter()
-            .all(|&name| channels.iter().any(|channel| channel.name == *name))
-    };
-    let in_color = |header: &Header| has(header, &["R", "G", "B"]);
-    let is_grey = |header: &Header| has(header, &["Y"]) && !has(header, &["RY"]) && !has(header, &["BY"]);
-    !headers.iter().any(in_color) && headers.iter().any(is_grey)
-}
-
-/// Refuses what the `exr` crate would spend all memory on or can't do, before any pixel is read.
-fn check_headers(headers: &[Header]) -> std::result::Result<(), &'static str> {
-    let is_sound = |Vec2(width, height): Vec2<usize>| matches!(width.checked_mul(height), Some(1..=MAX_PIXELS));
-    let subsampled = |header: &Header| {
-        let channels = &header.channels.list;
-        channels.iter().any(|c| c.sampling != Vec2(1, 1))
-    };
-    for header in headers {
-        if !is_sound(header.layer_size) || !is_sound(header.shared_attributes.display_window.size) {
-            return Err("has no pixels or more than 134 million: damaged, or scale it down first");
-        }
-        if subsampled(header) {
-            return Err("has channels of lower resolution: convert it to full resolution RGB first");
-        }
-    }
-    Ok(())
-}
-
-/// The part of a picture whose top left pixel lies at `position` that `display` shows; black where it has no pixels.
-fn crop(image: Image, position: Vec2<i32>, display: IntegerBounds) -> Image {
-    let Vec2(width, height) = display.size;
-    if (position, image.width, image.height) == (display.position, width, height) {
-        return image;
-    }
-    let source = |shown: usize, display: i32, position: i32, size: usize| {
-        usize::try_from(shown as i64 + i64::from(display) - i64::from(position))
-            .ok()
-            .filter(|&index| index < size)
-    };
-    let column = |x| source(x, display.position.x(), position.x(), image.width);
-    let row = |y| source(y, display.position.y(), position.y(), image.height);
-    let pixel = |x, y| Some(image.pixels[row(y)? * image.width + column(x)?]);
-    let pixels = (0..height)
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .map(|(x, y)| pixel(x, y).unwrap_or_default())
-        .collect();
-    Image::new(width, height, pixels)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::read::decode;
     use super::*;
     use crate::metrics;
     use exr::block::samples::Sample;
     use exr::image::{AnyChannel, AnyChannels, FlatSamples};
     use exr::meta::MetaData;
+    use exr::meta::attribute::IntegerBounds;
     use std::fs;
     use std::path::PathBuf;
     use tempfile::TempDir;
@@ -442,7 +304,10 @@ mod tests {
         let missing = folder.path().join("missing.exr");
         for (path, expected) in [
             (text.as_path(), "can't be read as OpenEXR"),
-            (chroma.as_path(), "can't be read as OpenEXR"),
+            (
+                chroma.as_path(),
+                "has neither channels R, G and B nor luminance Y alone",
+            ),
             (missing.as_path(), "can't be opened"),
             (folder.path(), "can't be"),
         ] {
@@ -483,19 +348,25 @@ mod tests {
 
     #[test]
     fn an_absurd_size_is_refused_before_memory_is_asked_for() {
-        const SIDE: u32 = 1 << 24;
         let (_folder, path) = written(&picture(), &metadata());
-        let mut bytes = fs::read(path).expect("a file");
-        let mut set = |attribute: &[u8], offset: usize, values: &[u32]| {
-            let name = bytes.windows(attribute.len()).position(|window| window == attribute);
-            let value = name.expect("the attribute") + attribute.len() + 4 + offset;
-            bytes[value..value + 4 * values.len()].copy_from_slice(bytemuck::cast_slice(values));
-        };
-        set(b"dataWindow\0box2i\0", 8, &[SIDE - 1; 2]);
-        set(b"displayWindow\0box2i\0", 8, &[SIDE - 1; 2]);
-        set(b"chunkCount\0int\0", 0, &[SIDE / 16]);
-        let error = decoding_error(&bytes).unwrap_or_default();
-        assert!(error.contains("more than 134 million"), "{error}");
+        let original = fs::read(path).expect("a file");
+        for (width, height, expected) in [
+            (1 << 24, 1 << 24, "more than 134 million"),
+            // All lines of a block are decoded together.
+            (1 << 22, 16u32, "blocks of more than 64 MiB"),
+        ] {
+            let mut bytes = original.clone();
+            let mut set = |attribute: &[u8], offset: usize, values: &[u32]| {
+                let name = bytes.windows(attribute.len()).position(|window| window == attribute);
+                let value = name.expect("the attribute") + attribute.len() + 4 + offset;
+                bytes[value..value + 4 * values.len()].copy_from_slice(bytemuck::cast_slice(values));
+            };
+            set(b"dataWindow\0box2i\0", 8, &[width - 1, height - 1]);
+            set(b"displayWindow\0box2i\0", 8, &[width - 1, height - 1]);
+            set(b"chunkCount\0int\0", 0, &[height.div_ceil(16)]);
+            let error = decoding_error(&bytes).unwrap_or_default();
+            assert!(error.contains(expected), "{error}");
+        }
     }
 
     #[test]
