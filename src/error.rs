@@ -45,7 +45,7 @@ impl Error {
     pub fn scene(path: &Path, what: impl Into<String>) -> Self {
         Self::Scene {
             path: path.to_owned(),
-            what: what.into(),
+            what: one_line(what.into()),
         }
     }
 
@@ -53,7 +53,20 @@ impl Error {
     pub fn file(path: &Path, what: impl Into<String>) -> Self {
         Self::File {
             path: path.to_owned(),
-            what: what.into(),
+            what: one_line(what.into()),
         }
     }
+}
+
+/// A message as one line: those of decoders may have several, or end with a line end.
+pub(crate) fn one_line(text: String) -> String {
+    if !text.contains(['\n', '\r']) {
+        return text;
+    }
+    let lines: Vec<&str> = text
+        .split(['\n', '\r'])
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .collect();
+    lines.join(" ")
 }

@@ -3,6 +3,8 @@
 use std::collections::HashSet;
 use std::fmt::Display;
 
+use crate::error::one_line;
+
 /// Result of a step of loading. The message says what is wrong, where and what to do; `Scene::load` adds the path.
 pub(super) type Check<T> = std::result::Result<T, String>;
 
@@ -57,7 +59,8 @@ pub(super) struct Warnings {
 
 impl Warnings {
     /// Adds a line unless it is there already, as it is for a mesh that several nodes show.
-    pub(super) fn push(&mut self, line: String) {
+    pub(super) fn push(&mut self, text: String) {
+        let line = one_line(text);
         if self.seen.insert(line.clone()) {
             self.lines.push(line);
         }
