@@ -2,8 +2,6 @@
 
 #[path = "scene/accessors.rs"]
 mod accessors;
-#[path = "scene/allocations.rs"]
-mod allocations;
 #[path = "scene/animation.rs"]
 mod animation;
 #[path = "scene/assets.rs"]
@@ -22,6 +20,8 @@ mod damaged;
 mod deformation;
 #[path = "scene/draco.rs"]
 mod draco;
+#[path = "scene/encoded.rs"]
+mod encoded;
 #[path = "scene/files.rs"]
 mod files;
 #[path = "scene/fixture.rs"]
@@ -36,8 +36,6 @@ mod instancing;
 mod lights;
 #[path = "scene/materials.rs"]
 mod materials;
-#[path = "scene/mutation.rs"]
-mod mutation;
 #[path = "scene/sharing.rs"]
 mod sharing;
 #[path = "scene/tangents.rs"]

@@ -3,45 +3,8 @@
 use ppm_vk::scene::Scene;
 use serde_json::{Value, json};
 
+use crate::encoded::{MESHOPT, compress, meshopt_room};
 use crate::fixture::{Fixture, assert_close, assert_error};
-
-const MESHOPT: &str = "EXT_meshopt_compression";
-
-/// Makes the view of an accessor a compressed one.
-fn compress(room: &mut Fixture, accessor: usize, encoded: &[u8], stride: usize, count: usize, mode: &str) {
-    let offset = room.binary.len();
-    room.binary.extend_from_slice(encoded);
-    room.set("/buffers/0/byteLength", json!(room.binary.len()));
-    let view = room.json["accessors"][accessor]["bufferView"].as_u64().expect("a view");
-    let extension = json!({
-        "buffer": 0, "byteOffset": offset, "byteLength": encoded.len(),
-        "byteStride": stride, "count": count, "mode": mode
-    });
-    room.set(
-        &format!("/bufferViews/{view}"),
-        json!({"buffer": 1, "byteLength": stride * count, "extensions": {MESHOPT: extension}}),
-    );
-}
-
-/// The room with its floor compressed.
-pub fn compressed() -> Fixture {
-    let mut room = Fixture::room();
-    room.set("/extensionsUsed", json!([MESHOPT]));
-    room.set("/extensionsRequired", json!([MESHOPT]));
-    room.set(
-        "/buffers/-",
-        json!({"byteLength": 4096, "extensions": {MESHOPT: {"fallback": true}}}),
-    );
-    let vectors = |bytes: &[u8]| -> Vec<[u8; 12]> { bytes.as_chunks().0.to_vec() };
-    let (positions, normals) = (vectors(&room.binary[..48]), vectors(&room.binary[48..96]));
-    for (accessor, vectors) in [(0, positions), (1, normals)] {
-        let encoded = meshopt::encode_vertex_buffer(&vectors).expect("encoded");
-        compress(&mut room, accessor, &encoded, 12, 4, "ATTRIBUTES");
-    }
-    let encoded = meshopt::encode_index_buffer(&[0, 1, 2, 0, 2, 3], 4).expect("encoded");
-    compress(&mut room, 2, &encoded, 2, 6, "TRIANGLES");
-    room
-}
 
 #[track_caller]
 fn assert_same(scene: &Scene, other: &Scene) {
@@ -52,7 +15,7 @@ fn assert_same(scene: &Scene, other: &Scene) {
 
 #[test]
 fn compressed_views_are_what_they_were() {
-    let mut room = compressed();
+    let mut room = meshopt_room();
     let plain = Fixture::room().scene();
     let scene = room.scene();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
@@ -65,7 +28,7 @@ fn compressed_views_are_what_they_were() {
 
 #[test]
 fn filters_are_undone() {
-    let mut room = compressed();
+    let mut room = meshopt_room();
     let view = |accessor: usize| format!("/bufferViews/{accessor}/extensions/{MESHOPT}/filter");
     let plain = Fixture::room().scene();
     let positions: Vec<[f32; 3]> = room.binary[..48]
@@ -96,7 +59,7 @@ fn filters_are_undone() {
 #[test]
 fn damaged_compression_is_named() {
     let fails = |key: &str, value: Value, parts: &[&str]| {
-        let mut room = compressed();
+        let mut room = meshopt_room();
         room.set(&format!("/bufferViews/0/extensions/{MESHOPT}/{key}"), value);
         assert_error(room.load(), &[&["bufferView 0", MESHOPT], parts].concat());
     };
@@ -109,7 +72,7 @@ fn damaged_compression_is_named() {
     fails("buffer", json!(9), &["buffer 9"]);
     fails("byteLength", json!(1 << 20), &["buffer 0"]);
     fails("byteLength", json!(20), &["20 bytes", "Attributes"]);
-    let mut room = compressed();
+    let mut room = meshopt_room();
     room.set("/bufferViews/0/byteLength", json!(12u64 << 40));
     room.set(&format!("/bufferViews/0/extensions/{MESHOPT}/count"), json!(1u64 << 40));
     room.assert_fails(&["can't stand for"]);

@@ -1,86 +1,11 @@
 //! Meshes compressed by `KHR_draco_mesh_compression`.
 
-use draco_core::{DataType, EncoderBuffer, EncoderOptions, GeometryAttributeType, Mesh, MeshEncoder, PointAttribute};
+use draco_core::{DataType, GeometryAttributeType};
 use ppm_vk::scene::Scene;
 use serde_json::json;
 
+use crate::encoded::{Attribute, DRACO, EDGEBREAKER, SEQUENTIAL, VALENCE, add_compressed, draco_room, encode};
 use crate::fixture::{Fixture, soup};
-
-const DRACO: &str = "KHR_draco_mesh_compression";
-
-/// Encodings: triangle by triangle, and along their edges.
-pub const SEQUENTIAL: i32 = 0;
-pub const EDGEBREAKER: i32 = 1;
-
-/// An attribute of a mesh to be compressed, as its accessor has it.
-pub struct Attribute<'a> {
-    pub kind: GeometryAttributeType,
-    pub component: DataType,
-    pub width: u8,
-    pub bytes: &'a [u8],
-}
-
-/// Compresses a mesh; the numbers of its attributes are those of the list. `quantized`: floats have 14 bits.
-pub fn encode(attributes: &[Attribute<'_>], triangles: &[[u32; 3]], method: i32, quantized: bool) -> Vec<u8> {
-    let mut mesh = Mesh::new();
-    let mut options = EncoderOptions::new();
-    options.set_encoding_method(method);
-    for attribute in attributes {
-        let size = attribute.component.byte_length() * usize::from(attribute.width);
-        let count = attribute.bytes.len() / size;
-        mesh.set_num_points(count);
-        let mut encoded = PointAttribute::new();
-        encoded.init(attribute.kind, attribute.width, attribute.component, false, count);
-        encoded.buffer_mut().write(0, attribute.bytes);
-        let id = mesh.add_attribute(encoded);
-        if quantized && attribute.component == DataType::Float32 {
-            options.set_attribute_quantization(id, 14);
-        }
-    }
-    mesh.set_num_faces(triangles.len());
-    for (index, triangle) in triangles.iter().enumerate() {
-        mesh.set_face_from_indices(index, *triangle);
-    }
-    let mut encoder = MeshEncoder::new();
-    encoder.set_mesh(mesh);
-    let mut encoded = EncoderBuffer::new();
-    encoder.encode(&options, &mut encoded).expect("encoded");
-    encoded.data().to_vec()
-}
-
-/// The room whose floor is there compressed alone.
-pub fn compressed(method: i32, quantized: bool) -> Fixture {
-    let mut room = Fixture::room();
-    let (positions, normals) = (room.binary[..48].to_vec(), room.binary[48..96].to_vec());
-    let attribute = |kind, bytes| Attribute {
-        kind,
-        component: DataType::Float32,
-        width: 3,
-        bytes,
-    };
-    let attributes = [
-        attribute(GeometryAttributeType::Position, &positions[..]),
-        attribute(GeometryAttributeType::Normal, &normals),
-    ];
-    let encoded = encode(&attributes, &[[0, 1, 2], [0, 2, 3]], method, quantized);
-    add_compressed(&mut room, &encoded);
-    for accessor in 0..3 {
-        room.remove(&format!("/accessors/{accessor}/bufferView"));
-    }
-    room.set("/extensionsRequired", json!([DRACO]));
-    room
-}
-
-/// Gives the floor compressed data besides what it has.
-fn add_compressed(room: &mut Fixture, encoded: &[u8]) {
-    let accessor = room.add_accessor(encoded, encoded.len(), 5121, "SCALAR");
-    let view = room.json["accessors"][accessor]["bufferView"].clone();
-    room.set(
-        "/meshes/0/primitives/0/extensions",
-        json!({DRACO: {"bufferView": view, "attributes": {"POSITION": 0, "NORMAL": 1}}}),
-    );
-    room.set("/extensionsUsed", json!([DRACO]));
-}
 
 /// The corners of all triangles, each triangle from its least corner on, in one order.
 fn sorted(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
@@ -101,9 +26,9 @@ fn sorted(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
 #[test]
 fn compressed_primitives_are_what_they_were() {
     let plain = sorted(&Fixture::room().scene());
-    for method in [SEQUENTIAL, EDGEBREAKER] {
+    for method in [SEQUENTIAL, EDGEBREAKER, VALENCE] {
         for quantized in [false, true] {
-            let scene = compressed(method, quantized).scene();
+            let scene = draco_room(method, quantized).scene();
             assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
             assert_eq!(sorted(&scene), plain, "method {method}, quantized {quantized}");
             let is_up = |normal: &glam::Vec3| normal.y > 0.999;
@@ -115,7 +40,7 @@ fn compressed_primitives_are_what_they_were() {
 #[test]
 fn accessors_are_as_many_as_the_compressed_data_has() {
     let plain = sorted(&Fixture::room().scene());
-    let mut room = compressed(EDGEBREAKER, false);
+    let mut room = draco_room(EDGEBREAKER, false);
     room.set("/accessors/0/count", json!(7));
     room.set("/accessors/2/count", json!(900));
     assert_eq!(sorted(&room.scene()), plain);
@@ -188,7 +113,7 @@ fn plain_data_stands_for_what_cannot_be_decompressed_and_that_is_said() {
 #[test]
 fn damaged_compression_is_named() {
     let fails = |pointer: &str, value, parts: &[&str]| {
-        let mut room = compressed(EDGEBREAKER, false);
+        let mut room = draco_room(EDGEBREAKER, false);
         room.set(&format!("/meshes/0/primitives/0/extensions/{DRACO}{pointer}"), value);
         room.assert_fails(&[&["mesh 0 \"floor\", primitive 0", DRACO], parts].concat());
     };
@@ -196,7 +121,7 @@ fn damaged_compression_is_named() {
     fails("/bufferView", json!(99), &["no bufferView 99"]);
     fails("/attributes/POSITION", json!(7), &["POSITION", "no attribute 7"]);
     fails("/bufferView", json!(3), &["bufferView 3", "can't be decompressed"]);
-    let mut room = compressed(EDGEBREAKER, false);
+    let mut room = draco_room(EDGEBREAKER, false);
     room.set("/meshes/0/primitives/0/attributes/POSITION", json!(99));
     room.assert_fails(&["POSITION", "no accessor 99"]);
 }

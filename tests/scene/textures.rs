@@ -7,6 +7,7 @@ use ppm_vk::layout::{CLAMP, MIRROR_REPEAT, NEAREST, SECOND_SET, SRGB, WRAP_U, WR
 use ppm_vk::scene::Alpha;
 use serde_json::{Value, json};
 
+use super::encoded::{KTX2, webp};
 use super::fixture::Fixture;
 use crate::allocations::peak_of;
 
@@ -20,23 +21,9 @@ fn two_texels() -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(png.into_inner()))
 }
 
-/// The same texels as WebP, without loss.
-pub fn webp() -> String {
-    let mut webp = std::io::Cursor::new(Vec::new());
-    image::RgbaImage::from_vec(2, 1, vec![255, 0, 0, 255, 0, 255, 0, 128])
-        .expect("two texels")
-        .write_to(&mut webp, image::ImageFormat::WebP)
-        .expect("a WebP");
-    format!("data:image/webp;base64,{}", STANDARD.encode(webp.into_inner()))
+fn webp_uri() -> String {
+    format!("data:image/webp;base64,{}", STANDARD.encode(webp()))
 }
-
-/// Four squares of 4×4 texels, red, green, blue and white, by Basis Universal's encoder.
-pub const KTX2: [(&str, &[u8]); 4] = [
-    ("ETC1S", include_bytes!("ktx2/etc1s.ktx2")),
-    ("ETC1S with alpha", include_bytes!("ktx2/etc1s-alpha.ktx2")),
-    ("UASTC", include_bytes!("ktx2/uastc.ktx2")),
-    ("UASTC, mip levels, Zstandard", include_bytes!("ktx2/uastc-zstd.ktx2")),
-];
 
 /// The room with a floor of this material and one texture, of two texels.
 fn textured(material: Value) -> Fixture {
@@ -122,6 +109,11 @@ fn images_that_cannot_be_read_are_told_and_left_out() {
             ["none of PNG, JPEG, WebP and KTX 2.0", "left out"],
         ),
         (json!({}), ["neither a uri nor a bufferView", "left out"]),
+        // What the decoder says of a JPEG that is cut short ends with a line end.
+        (
+            json!({"uri": "data:;base64,/9j/4AAQSkZJRgABAQAAAQABAAD/"}),
+            ["can't be decoded", "left out"],
+        ),
     ] {
         let mut room = textured(floor());
         room.set("/images/0", image);
@@ -154,12 +146,12 @@ fn textured_by(extension: &str, uri: &str, has_fallback: bool) -> Fixture {
 fn webp_is_read_before_what_stands_for_it() {
     let plain = textured(with_base_color(json!({"index": 0}))).scene();
     for has_fallback in [true, false] {
-        let scene = textured_by("EXT_texture_webp", &webp(), has_fallback).scene();
+        let scene = textured_by("EXT_texture_webp", &webp_uri(), has_fallback).scene();
         assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
         assert_eq!(scene.textures, plain.textures);
     }
     // The PNG is another picture here: what is looked up is the WebP.
-    let mut room = textured_by("EXT_texture_webp", &webp(), true);
+    let mut room = textured_by("EXT_texture_webp", &webp_uri(), true);
     room.set("/images/0", json!({"uri": "absent.png"}));
     assert_eq!(room.scene().textures, plain.textures);
 }
