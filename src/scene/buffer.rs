@@ -66,7 +66,7 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>, warn: impl FnOn
         Some(uri) => match data_of(uri) {
             Some(data) => (decode_data_uri(data)?, "its data URI".to_owned()),
             None => {
-                let path = folder.join(relative_path(uri)?);
+                let path = path_of(uri, folder)?;
                 (read_file(&path, length)?, quote(uri))
             }
         },
@@ -95,7 +95,7 @@ pub(super) fn read_uri(uri: &str, folder: &Path, needed: impl FnOnce(&[u8]) -> u
     if let Some(data) = data_of(uri) {
         return decode_data_uri(data);
     }
-    let path = folder.join(relative_path(uri)?);
+    let path = path_of(uri, folder)?;
     let head = read_file(&path, HEAD)?;
     if (head.len() as u64) < HEAD {
         return Ok(head);
@@ -114,7 +114,7 @@ pub(super) fn referred_files<'a>(root: &'a Root, folder: &'a Path) -> impl Itera
     let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
     let images = root.images.iter().filter_map(|image| image.uri.as_deref());
     let files = buffers.chain(images).filter(|uri| data_of(uri).is_none());
-    files.filter_map(|uri| Some(folder.join(relative_path(uri).ok()?)))
+    files.filter_map(|uri| path_of(uri, folder).ok())
 }
 
 /// `length` bytes from byte `start`, if there are as many.
@@ -164,7 +164,16 @@ fn decode_data_uri(data: &str) -> Check<Vec<u8>> {
         .map_err(|error| damaged(format_args!("its data URI isn't valid base64 ({error})")))
 }
 
-/// The path that a relative URI names, checked to stay in the scene file's folder or below.
+/// The file that a relative URI names. A query or fragment is a part of its name only where there is such a file.
+fn path_of(uri: &str, folder: &Path) -> Check<PathBuf> {
+    let path = folder.join(relative_path(uri)?);
+    match uri.find(['?', '#']) {
+        Some(end) if !path.exists() => Ok(folder.join(relative_path(&uri[..end])?)),
+        _ => Ok(path),
+    }
+}
+
+/// The path that a relative URI names from the scene file's folder on.
 fn relative_path(uri: &str) -> Check<PathBuf> {
     let advice = "put the file beside the scene and refer to it by a relative path";
     if let Some((scheme, _)) = uri.split_once(':')
@@ -182,12 +191,12 @@ fn relative_path(uri: &str) -> Check<PathBuf> {
         .filter(|decoded| !decoded.contains('\0'))
         .ok_or_else(|| damaged(format_args!("its uri {} isn't a valid file name", quote(uri))))?;
     let path = PathBuf::from(decoded);
-    let is_inside = path
+    if path
         .components()
-        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if !is_inside {
+        .any(|part| matches!(part, Component::RootDir | Component::Prefix(_)))
+    {
         return Err(format!(
-            "its uri {} leads out of the scene's folder; {advice}",
+            "its uri {} isn't relative to the scene's folder; {advice}",
             quote(uri)
         ));
     }
