@@ -136,7 +136,7 @@ pub(super) fn assemble(document: &Document, instances: &[Instance<'_>], warnings
     let root = &document.root;
     let normalisation = normalise(root, instances)?;
     let mut builder = Builder::new(normalisation, sharing::is_worth_it(root, instances));
-    let mut dropped = Vec::new();
+    let mut dropped: Vec<(String, usize)> = Vec::new();
     for instance in instances {
         document
             .budget
@@ -144,8 +144,14 @@ pub(super) fn assemble(document: &Document, instances: &[Instance<'_>], warnings
         let count = builder
             .add(root, instance)
             .map_err(|what| format!("{}: {what}", instance.label(root)))?;
-        if count > 0 {
-            dropped.push(format!("{} ({count})", quote(&instance.name(root))));
+        if count == 0 {
+            continue;
+        }
+        let name = instance.name(root);
+        match dropped.last_mut() {
+            // Instances of one node follow each other.
+            Some((last, sum)) if *last == name => *sum += count,
+            _ => dropped.push((name, count)),
         }
     }
     builder.complete_attributes();
@@ -158,6 +164,10 @@ pub(super) fn assemble(document: &Document, instances: &[Instance<'_>], warnings
         );
     }
     if !dropped.is_empty() {
+        let dropped: Vec<String> = dropped
+            .iter()
+            .map(|(name, count)| format!("{} ({count})", quote(name)))
+            .collect();
         warnings.push(format!(
             "dropped {} triangles of zero area, in {}; no ray could meet them, and nothing is missing",
             geometry.dropped_triangles,

@@ -141,6 +141,22 @@ fn a_skin_puts_its_mesh_in_one_place_and_that_is_said() {
 }
 
 #[test]
+fn triangles_that_vanish_in_all_instances_are_told_once() {
+    let mut room = Fixture::room();
+    let translations = room.add_vectors(&[[0.0; 3], [0.0, 0.5, 0.0], [0.0, 0.25, 0.0]]);
+    instanced(&mut room, json!({"TRANSLATION": translations}));
+    room.set_lamp(&[
+        [0.0, 1.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [0.0, 1.0, 1.0],
+        [0.0; 3],
+        [0.0; 3],
+        [0.0; 3],
+    ]);
+    room.assert_warns(&["dropped 3 triangles", "in \"lamp\" (3)"]);
+}
+
+#[test]
 fn ten_thousand_instances_share_their_mesh_and_load_at_once() {
     let mut room = Fixture::room();
     // A strip of 100 triangles.
