@@ -118,6 +118,7 @@ impl Decoder {
         if self.bytes > MOST_BYTES {
             return Err(too_much());
         }
+        document.budget.check(self.bytes, "decompressed data")?;
         let indices = Decompressed {
             count: 3 * triangles,
             component: ComponentType::U32,

@@ -197,6 +197,6 @@ impl Picture {
         let path = self.folder.path().join(format!("sky.{}", self.extension));
         let _ = fs::remove_file(&path);
         fs::write(&path, bytes).expect("a file in the temporary folder");
-        Outcome::of(Environment::read(&path), assert_shines)
+        Outcome::of(Environment::read(&path, 2 << 30), assert_shines)
     }
 }
