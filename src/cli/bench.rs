@@ -8,6 +8,7 @@ use clap::{Args, CommandFactory};
 
 use super::args::{Arguments, gather_method, png_file, positive, resolution};
 use super::outputs::{all, check_outputs, named};
+use super::scene::{SceneArguments, say_remarks};
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
 use crate::config::{EmissionChoice, Probe, RenderConfig};
@@ -27,6 +28,8 @@ pub struct BenchGather {
     /// glTF file [default: the project's cornell].
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
+    #[command(flatten)]
+    read: SceneArguments,
     /// Pixels; may be given several times [default: the paper's, 320x280 and 1920x1080; with --scaling 320x280].
     #[arg(long, value_name = "WxH", value_parser = resolution)]
     resolution: Vec<[u32; 2]>,
@@ -72,9 +75,12 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
         Arguments::command().error(ErrorKind::ArgumentConflict, text).exit();
     }
     let outputs = [&arguments.json, &arguments.plot, &arguments.clusters];
-    let inputs: Vec<&Path> = arguments.scene.as_deref().into_iter().collect();
+    let inputs = arguments
+        .scene
+        .as_deref()
+        .map_or_else(Vec::new, |scene| arguments.read.inputs(scene));
     check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
-    let scene = load(arguments.scene.as_deref())?;
+    let scene = load(arguments.scene.as_deref(), &arguments.read)?;
     let inputs: Vec<&Path> = scene.files.iter().map(PathBuf::as_path).collect();
     check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
     let packed = PackedScene::new(&scene).map_err(anyhow::Error::msg)?;
@@ -165,6 +171,8 @@ pub struct BenchFeatures {
     /// glTF file [default: a Cornell box].
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
+    #[command(flatten)]
+    read: SceneArguments,
     /// Pixels.
     #[arg(long, value_name = "WxH", default_value = "256x256", value_parser = resolution)]
     resolution: [u32; 2],
@@ -184,7 +192,7 @@ pub struct BenchFeatures {
 
 /// Measures what features cost that a scene doesn't need, prints the table.
 pub fn features(arguments: &BenchFeatures) -> Result<Outcome> {
-    let scene = load(arguments.scene.as_deref())?;
+    let scene = load(arguments.scene.as_deref(), &arguments.read)?;
     let packed = PackedScene::new(&scene).map_err(anyhow::Error::msg)?;
     let config = RenderConfig {
         resolution: arguments.resolution,
@@ -218,19 +226,17 @@ fn resolutions(arguments: &BenchGather) -> Vec<[u32; 2]> {
     }
 }
 
-fn load(path: Option<&Path>) -> Result<Scene> {
+fn load(path: Option<&Path>, read: &SceneArguments) -> Result<Scene> {
     if let Some(path) = path {
-        let scene = Scene::load(path)?;
-        for warning in &scene.warnings {
-            say!("warning: {warning}");
-        }
+        let scene = read.load(path, true)?;
+        say_remarks(&scene);
         return Ok(scene);
     }
     let folder = tempfile::tempdir().context("a folder for the scene can't be made")?;
     for (name, bytes) in CORNELL {
         std::fs::write(folder.path().join(name), bytes).context("the scene can't be written")?;
     }
-    Ok(Scene::load(&folder.path().join(CORNELL[0].0))?)
+    read.load(&folder.path().join(CORNELL[0].0), true)
 }
 
 fn write_clusters(bench: &GatherBench, file: &Path) -> Result<()> {

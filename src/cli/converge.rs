@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::args::seconds;
 use super::outputs::{all, check_outputs, named};
-use super::scene::SceneArguments;
+use super::scene::{SceneArguments, say_remarks};
 use super::{Outcome, interrupt, print};
 use crate::bench::{Converge, Curve, converge, converge_table, csv, plot_convergence};
 use crate::config::{Direct, EmissionChoice, Estimator, RenderConfig, Sampler};
@@ -138,9 +138,7 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
     let scene = arguments.read.load(&arguments.scene, true)?;
     inputs.extend(scene.files.iter().map(PathBuf::as_path));
     check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
-    for warning in &scene.warnings {
-        say!("warning: {warning}");
-    }
+    say_remarks(&scene);
     let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(&arguments.scene, what))?;
     let side = |pixels: usize| u32::try_from(pixels).context("the reference is too large");
     let base = RenderConfig {

@@ -93,7 +93,6 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
             "environment": scene.environment.is_some(),
             "cameras": scene.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
             "variants": scene.variants,
-            "notes": scene.notes,
             "features": packed.features.names(),
             "bounds": { "min": low.to_array(), "max": high.to_array() },
             "device_memory": memory.map(|(memory, config)| json!({
@@ -103,6 +102,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
                 "resolution": config.resolution,
                 "photons": config.photons,
             })),
+            "notes": scene.notes,
             "warnings": scene.warnings,
         });
         return Ok(serde_json::to_string_pretty(&value)? + "\n");

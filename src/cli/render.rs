@@ -9,6 +9,7 @@ use clap::error::ErrorKind;
 use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::outputs::{all, check_outputs};
 use super::progress::{BUILDING, Limits, Progress, while_showing, with_prefix};
+use super::scene::say_remarks;
 use super::work::{Rendered, Work};
 use super::{Outcome, interrupt};
 use crate::backend::Backend;
@@ -43,12 +44,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let mut inputs = arguments.read.inputs(path);
     inputs.extend(scene.files.iter().map(PathBuf::as_path));
     check_outputs(&inputs, outputs(arguments, &output))?;
-    for note in &scene.notes {
-        say!("{note}");
-    }
-    for warning in &scene.warnings {
-        say!("warning: {warning}");
-    }
+    say_remarks(&scene);
     let mut camera = scene.cameras[scene.camera_index(arguments.camera.as_deref())?].clone();
     if let Some(radius) = arguments.aperture {
         camera.lens = Some(scene.lens(&camera, radius, arguments.focus)?);

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::args::{number, positive};
 use super::progress::{READING, while_showing};
-use crate::scene::{Environment, LoadOptions, MEMORY_LIMIT, Scene};
+use crate::scene::{Environment, LightUnits, LoadOptions, MEMORY_LIMIT, Scene};
 
 /// How a scene's file is read.
 #[derive(Debug, Args)]
@@ -16,8 +16,12 @@ pub struct SceneArguments {
     /// 1,1,1 for a scene without any light].
     #[arg(long, value_name = "FILE|R,G,B", value_parser = environment)]
     environment: Option<EnvironmentChoice>,
+    /// Units of points, spots and suns (KHR_lights_punctual): as the specification has them; 683 times as large as Blender's
+    /// exporter writes them unless told «Unitless»; or by the exporter that the file names.
+    #[arg(long, value_enum, default_value_t)]
+    light_units: LightUnits,
     /// Apply the scene's animations at this time, in seconds [default: everything at rest].
-    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = frame_time)]
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     frame_time: Option<f64>,
     /// Memory that the scene may take as it is read: buffers, images, geometry. A small file can ask for any amount
     /// [default: 2].
@@ -66,8 +70,19 @@ impl SceneArguments {
             memory_limit: Some(memory_limit),
             variant: self.variant.clone(),
             scene: self.scene_name.clone(),
+            light_units: self.light_units,
         };
         Ok(while_showing(READING, quiet, || Scene::load_with(path, options))?)
+    }
+}
+
+/// Says what a user should know of a scene.
+pub fn say_remarks(scene: &Scene) {
+    for note in &scene.notes {
+        say!("note: {note}");
+    }
+    for warning in &scene.warnings {
+        say!("warning: {warning}");
     }
 }
 
@@ -85,10 +100,10 @@ fn environment(text: &str) -> Result<EnvironmentChoice, String> {
     }
 }
 
-fn frame_time(text: &str) -> Result<f64, String> {
-    let time = number(text)?;
-    if time.is_finite() {
-        Ok(time)
+fn finite(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value.is_finite() {
+        Ok(value)
     } else {
         Err("must be finite".to_owned())
     }

@@ -12,7 +12,7 @@ use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::graph::place_nodes;
 use super::punctual::punctual_lights;
 use super::texture::TextureReader;
-use super::{Environment, Scene, Surface, camera, geometry, material, variants};
+use super::{Environment, LightUnits, Scene, Surface, camera, geometry, material, variants};
 use crate::error::{Error, Result};
 
 /// What a scene is loaded with.
@@ -29,6 +29,8 @@ pub struct LoadOptions {
     pub variant: Option<String>,
     /// The scene of the file, by name or index. `None`: its default one.
     pub scene: Option<String>,
+    /// What the intensities of punctual lights mean.
+    pub light_units: LightUnits,
 }
 
 impl Scene {
@@ -93,6 +95,10 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     }
 
     let cameras = camera::cameras(root, &nodes, geometry.normalisation, &mut warnings)?;
+    let lights = punctual_lights(root, &nodes, geometry.normalisation, &options, &mut warnings)?;
+    if !lights.is_empty() {
+        notes.extend(options.light_units.note(root));
+    }
     let mut scene = Scene {
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         positions: geometry.positions,
@@ -103,7 +109,7 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         triangles: geometry.triangles,
         objects: geometry.objects,
         materials,
-        lights: punctual_lights(root, &nodes, geometry.normalisation, &mut warnings)?,
+        lights,
         environment: options.environment,
         textures: textures.finish(),
         cameras,

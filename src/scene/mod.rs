@@ -32,6 +32,7 @@ mod ktx2;
 mod light;
 mod light_sources;
 mod light_table;
+mod light_units;
 mod load;
 mod material;
 mod meshopt;
@@ -57,6 +58,7 @@ pub(crate) use features::{DIELECTRIC, GLOSSY, MIRROR};
 pub use light_sources::MOST_SOURCES;
 #[cfg(test)]
 pub(crate) use light_table::set_alias_table;
+pub use light_units::LightUnits;
 pub use load::LoadOptions;
 pub use packed::PackedScene;
 pub use placement::Placement;
@@ -337,10 +339,10 @@ pub struct Scene {
     pub files: Vec<PathBuf>,
     /// Names of the file's material variants.
     pub variants: Vec<String>,
-    /// What was chosen where the file leaves a choice, one line each.
-    pub notes: Vec<String>,
     /// What the file asks for and the renderer doesn't do, one line each.
     pub warnings: Vec<String>,
+    /// What was decided where a file leaves a choice, one line each.
+    pub notes: Vec<String>,
 }
 
 impl Scene {

@@ -7,9 +7,9 @@ use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Typ
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
-use super::Normalisation;
 use super::diagnostic::{Check, Warnings, damaged, label};
 use super::graph::{PlacedNode, node_label};
+use super::{LoadOptions, Normalisation};
 
 /// A spot's cone is no narrower than this between its edges, as a part of its 1 − cos: exporters write edges that are as
 /// good as the same.
@@ -69,6 +69,7 @@ pub(super) fn punctual_lights(
     root: &Root,
     nodes: &[PlacedNode<'_>],
     normalisation: Normalisation,
+    options: &LoadOptions,
     warnings: &mut Warnings,
 ) -> Check<Vec<PunctualLight>> {
     let extension = root
@@ -99,7 +100,7 @@ pub(super) fn punctual_lights(
             continue;
         };
         let light_in_place =
-            place(light, emission, placed, normalisation).map_err(|what| format!("{label}: {what}"))?;
+            place(light, emission, placed, normalisation, options, root).map_err(|what| format!("{label}: {what}"))?;
         if light_in_place.intensity.max_element() > 0.0 {
             lights.push(light_in_place);
         }
@@ -157,6 +158,8 @@ fn place(
     emission: Emission,
     placed: &PlacedNode<'_>,
     normalisation: Normalisation,
+    options: &LoadOptions,
+    root: &Root,
 ) -> Check<PunctualLight> {
     let color = DVec3::from(light.color.map(f64::from));
     let in_file = color * f64::from(light.intensity);
@@ -183,7 +186,7 @@ fn place(
     } else {
         normalisation.scale.powi(2)
     };
-    let intensity = (in_file * unit).as_vec3();
+    let intensity = (in_file / options.light_units.divisor(root) * unit).as_vec3();
     let position = if is_directional {
         Vec3::ZERO
     } else {

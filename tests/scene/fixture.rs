@@ -257,12 +257,16 @@ impl Fixture {
 
     /// The same, with an environment around it.
     pub fn load_under(&self, environment: Environment) -> Result<Scene> {
-        self.write("room.bin", &self.binary);
-        self.write("room.gltf", self.json.to_string().as_bytes());
-        let options = LoadOptions {
+        self.load_with(LoadOptions {
             environment: Some(environment),
             ..LoadOptions::default()
-        };
+        })
+    }
+
+    /// The same with options.
+    pub fn load_with(&self, options: LoadOptions) -> Result<Scene> {
+        self.write("room.bin", &self.binary);
+        self.write("room.gltf", self.json.to_string().as_bytes());
         Scene::load_with(&self.path("room.gltf"), options)
     }
 

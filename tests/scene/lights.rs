@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::Vec3;
-use ppm_vk::scene::{Emission, EmissiveTriangle, Environment, PackedScene};
+use ppm_vk::scene::{Emission, EmissiveTriangle, Environment, LightUnits, LoadOptions, PackedScene};
 use serde_json::{Value, json};
 
 use crate::fixture::Fixture;
@@ -187,4 +187,43 @@ fn every_light_has_a_share_of_the_choices() {
     );
     let sum: f64 = packed.lights.iter().map(|light| f64::from(light.probability)).sum();
     assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+}
+
+/// Blender's exporter multiplies lamps by 683 in its default units, and not what emits.
+#[test]
+fn lamps_of_blenders_exporter_are_divided_by_683_and_it_is_said() {
+    let lights = [
+        json!({"type": "point", "intensity": 6830}),
+        json!({"type": "directional", "intensity": 683}),
+    ];
+    let mut room = room_with(&lights);
+    let intensities = |room: &Fixture, light_units: LightUnits| {
+        let options = LoadOptions {
+            light_units,
+            ..LoadOptions::default()
+        };
+        let scene = room.load_with(options).expect("a scene");
+        let found = scene.lights.iter().map(|light| light.intensity.x).collect::<Vec<_>>();
+        let power = scene.emissive_triangles()[0].power;
+        (found, scene.notes, power)
+    };
+    let (taken, divided) = (vec![6830.0, 683.0], vec![10.0, 1.0]);
+    let power = intensities(&room, LightUnits::Spec).2;
+    for (generator, units, expected, said) in [
+        ("Khronos glTF Blender I/O v5.3.43", LightUnits::Auto, &divided, true),
+        ("Khronos glTF Blender I/O v5.3.43", LightUnits::Spec, &taken, false),
+        ("another", LightUnits::Auto, &taken, false),
+        ("another", LightUnits::Blender, &divided, false),
+    ] {
+        room.set("/asset/generator", json!(generator));
+        let (found, notes, lamp) = intensities(&room, units);
+        assert_eq!(&found, expected, "{generator}, {units:?}");
+        assert_eq!(lamp, power, "what emits is taken as it is: {generator}, {units:?}");
+        assert_eq!(notes.len(), usize::from(said), "{generator}, {units:?}: {notes:?}");
+        let says = |note: &String| note.contains("683") && note.contains("--light-units spec");
+        assert!(notes.iter().all(says), "{notes:?}");
+    }
+    let mut unlit = Fixture::room();
+    unlit.set("/asset/generator", json!("Khronos glTF Blender I/O v5.3.43"));
+    assert_eq!(unlit.scene().notes, [""; 0], "without a lamp there is nothing to say");
 }
