@@ -40,6 +40,8 @@ mod lights;
 mod materials;
 #[path = "scene/sharing.rs"]
 mod sharing;
+#[path = "scene/solid.rs"]
+mod solid;
 #[path = "scene/tangents.rs"]
 mod tangents;
 #[path = "scene/textures.rs"]

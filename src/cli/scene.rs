@@ -20,6 +20,10 @@ pub struct SceneArguments {
     /// exporter writes them unless told «Unitless»; or by the exporter that the file names.
     #[arg(long, value_enum, default_value_t)]
     light_units: LightUnits,
+    /// Take closed meshes of glass without a volume (KHR_materials_transmission alone, as Blender exports glass) as solid
+    /// [default: thin walls, as glTF has it].
+    #[arg(long)]
+    solid_glass: bool,
     /// Apply the scene's animations at this time, in seconds [default: everything at rest].
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     frame_time: Option<f64>,
@@ -71,6 +75,7 @@ impl SceneArguments {
             variant: self.variant.clone(),
             scene: self.scene_name.clone(),
             light_units: self.light_units,
+            solid_glass: self.solid_glass,
         };
         Ok(while_showing(READING, quiet, || Scene::load_with(path, options))?)
     }

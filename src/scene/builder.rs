@@ -25,6 +25,8 @@ pub(super) struct Geometry {
     pub tangents: Vec<Vec4>,
     pub triangles: Vec<Triangle>,
     pub objects: Vec<Object>,
+    /// Of each object, the index of the node that shows it.
+    pub nodes: Vec<usize>,
     pub normalisation: Normalisation,
     pub dropped_triangles: usize,
 }
@@ -60,6 +62,7 @@ impl Builder {
                 tangents: Vec::new(),
                 triangles: Vec::new(),
                 objects: Vec::new(),
+                nodes: Vec::new(),
                 normalisation,
                 dropped_triangles: 0,
             },
@@ -123,6 +126,7 @@ impl Builder {
         self.geometry.dropped_triangles += dropped;
         if !object.triangles.is_empty() {
             self.geometry.objects.push(object);
+            self.geometry.nodes.push(instance.node_index());
         }
         Ok(dropped)
     }

@@ -100,6 +100,11 @@ impl<'a> Instance<'a> {
         (self.mesh, self.primitive_index)
     }
 
+    /// Index of the node that shows it.
+    pub(super) fn node_index(&self) -> usize {
+        self.node.index
+    }
+
     /// Whether other nodes show the primitive as well.
     pub(super) fn is_repeated(&self) -> bool {
         Rc::strong_count(&self.primitive) > 1

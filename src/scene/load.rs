@@ -12,7 +12,7 @@ use super::document::{Document, SUPPORTED_EXTENSIONS};
 use super::graph::place_nodes;
 use super::punctual::punctual_lights;
 use super::texture::TextureReader;
-use super::{Environment, LightUnits, Scene, Surface, camera, geometry, material, variants};
+use super::{Environment, LightUnits, Scene, Surface, camera, geometry, material, solid, variants};
 use crate::error::{Error, Result};
 
 /// What a scene is loaded with.
@@ -31,6 +31,8 @@ pub struct LoadOptions {
     pub scene: Option<String>,
     /// What the intensities of punctual lights mean.
     pub light_units: LightUnits,
+    /// Whether glass without a volume is solid where its mesh is closed, instead of a thin wall.
+    pub solid_glass: bool,
 }
 
 impl Scene {
@@ -75,7 +77,7 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     warn_of_ignored(&document, &options, &mut warnings);
 
     let instances = geometry::instances(&document, &nodes, &pose, &mut warnings)?;
-    let geometry = geometry::assemble(&document, &instances, &mut warnings)?;
+    let mut geometry = geometry::assemble(&document, &instances, &mut warnings)?;
 
     let mut used = vec![false; root.materials.len() + 1];
     for object in &geometry.objects {
@@ -87,6 +89,12 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     document.budget.settle()?;
     if used.last() == Some(&false) {
         materials.pop();
+    }
+    let thin = solid::thin_glass(&materials, &used);
+    if options.solid_glass {
+        notes.extend(solid::make_solid(root, &mut geometry, &mut materials, &thin)?);
+    } else {
+        notes.extend(solid::note(root, &thin));
     }
     for material in &mut materials {
         if let Surface::Dielectric(glass) = &mut material.surface {

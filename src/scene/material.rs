@@ -38,6 +38,7 @@ pub(super) fn materials(
     for (index, json) in root.materials.iter().chain([&default]).enumerate() {
         let mut reader = Reader {
             json,
+            solid: false,
             warnings: Vec::new(),
         };
         let label = label("material", index, json.name.as_deref());
@@ -57,9 +58,24 @@ pub(super) fn materials(
     Ok(materials)
 }
 
+/// What the material at `index`, which was read as `thin`, is if it isn't taken for a thin wall.
+pub(super) fn solid(root: &json::Root, index: usize, thin: &Material) -> Check<Material> {
+    let mut reader = Reader {
+        json: &root.materials[index],
+        solid: true,
+        warnings: Vec::new(),
+    };
+    Ok(Material {
+        textures: thin.textures,
+        ..reader.read(index)?
+    })
+}
+
 /// One material with the warnings about it.
 struct Reader<'a> {
     json: &'a json::Material,
+    /// Whether it is solid where it has no volume.
+    solid: bool,
     warnings: Vec<String>,
 }
 
@@ -141,7 +157,7 @@ impl Reader<'_> {
         // Where all is reflected, nothing is bent.
         let ior = if ior == 0.0 { DEFAULT_IOR } else { ior };
         let volume = self.extension(|extensions| extensions.volume.as_ref());
-        let thin = volume.is_none_or(|volume| volume.thickness_factor.0 == 0.0);
+        let thin = !self.solid && volume.is_none_or(|volume| volume.thickness_factor.0 == 0.0);
         Ok(Surface::Dielectric(Dielectric {
             ior,
             roughness,

@@ -47,6 +47,7 @@ mod punctual;
 mod scenes;
 mod sharing;
 mod skin;
+mod solid;
 mod sphere;
 mod tangents;
 mod texture;
