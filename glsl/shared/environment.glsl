@@ -1,7 +1,7 @@
 // What shines from afar. Include after sampling.glsl, texel.glsl and scene.glsl.
 //
 // The picture is equirectangular: its upper edge is +Y, its centre +Z, and -X lies to the right of it. The buffer has its
-// size, then each row's cosines at the upper and the lower edge, then the pixels; w: the probability of a row, or of a
+// size and how far it is rotated about +Y, in turns, then each row's cosines at the upper and the lower edge, then the pixels; w: the probability of a row, or of a
 // pixel within its row, and those before it, in multiples of 2⁻²⁴ as random numbers are.
 uniform usamplerBuffer Environment;
 
@@ -12,6 +12,10 @@ struct Sky {
 
 uvec2 environment_size() {
     return TEXEL_BITS(Environment, 0u).xy;
+}
+
+float environment_rotation() {
+    return TEXEL(Environment, 0u).z;
 }
 
 vec3 environment_pixel(uvec2 size, uint x, uint y) {
@@ -87,7 +91,7 @@ Sky sample_environment(vec2 u, out vec3 direction) {
     float up = mix(edges.x, edges.y, row.within);
     float across = sqrt(max(0.0, (1.0 - up) * (1.0 + up)));
     float turn = float(column.index) + column.within;
-    float phi = 2.0 * PI * (turn / float(size.x) - 0.5);
+    float phi = 2.0 * PI * (turn / float(size.x) - 0.5 - environment_rotation());
     direction = normalize(vec3(-across * sin(phi), up, across * cos(phi)));
     return Sky(environment_radiance(size, vec2(turn, rows_below_pole(size, across, up))),
                row.probability * column.probability / solid_angle_of_pixel(size, edges));
@@ -96,8 +100,8 @@ Sky sample_environment(vec2 u, out vec3 direction) {
 // What comes from a direction, which is a unit vector.
 Sky environment_at(vec3 direction) {
     uvec2 size = environment_size();
-    vec2 place = vec2((0.5 + angle_of(-direction.x, direction.z) / (2.0 * PI)) * float(size.x),
-                      rows_below_pole(size, length(direction.xz), direction.y));
+    float turn = fract(0.5 + angle_of(-direction.x, direction.z) / (2.0 * PI) + environment_rotation());
+    vec2 place = vec2(turn * float(size.x), rows_below_pole(size, length(direction.xz), direction.y));
     uvec2 pixel = min(uvec2(place), size - 1u);
     vec2 edges = TEXEL(Environment, 1u + pixel.y).xy;
     float probability = probability_of_entry(1u, pixel.y) *

@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::args::{number, positive};
 use super::progress::{READING, while_showing};
+use crate::error::Error;
 use crate::scene::{Environment, LightUnits, LoadOptions, MEMORY_LIMIT, Scene};
 
 /// How a scene's file is read.
@@ -16,6 +17,26 @@ pub struct SceneArguments {
     /// 1,1,1 for a scene without any light].
     #[arg(long, value_name = "FILE|R,G,B", value_parser = environment)]
     environment: Option<EnvironmentChoice>,
+    /// Turn the environment about +Y, which takes +Z towards +X. 90 puts a picture where Blender's world has it.
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        requires = "environment",
+        allow_negative_numbers = true,
+        value_parser = finite
+    )]
+    environment_rotation: f64,
+    /// Multiply the environment's radiance.
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 1.0,
+        requires = "environment",
+        allow_negative_numbers = true,
+        value_parser = positive
+    )]
+    environment_strength: f64,
     /// Units of points, spots and suns (KHR_lights_punctual): as the specification has them; 683 times as large as Blender's
     /// exporter writes them unless told «Unitless»; or by the exporter that the file names.
     #[arg(long, value_enum, default_value_t)]
@@ -68,6 +89,12 @@ impl SceneArguments {
             Some(EnvironmentChoice::Constant(radiance)) => Some(Environment::constant((*radiance).into())),
             Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture, memory_limit)?),
         };
+        let placed = |environment: Environment| {
+            let scaled = environment.scaled(self.environment_strength);
+            let scaled = scaled.map_err(|what| Error::Config(format!("--environment-strength: {what}")));
+            scaled.map(|environment| environment.rotated(self.environment_rotation))
+        };
+        let environment = environment.map(placed).transpose()?;
         let options = LoadOptions {
             frame_time: self.frame_time,
             environment,

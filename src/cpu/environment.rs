@@ -18,6 +18,8 @@ pub(super) struct Sky {
 pub(super) struct Environment<'a> {
     width: usize,
     height: usize,
+    /// About +Y, in turns.
+    rotation: f64,
     /// Cosines at the upper and the lower edge, unused, cumulative probability.
     rows: &'a [[f32; 4]],
     /// Radiance, cumulative probability within the row.
@@ -32,6 +34,7 @@ impl<'a> Environment<'a> {
         Self {
             width,
             height,
+            rotation: table[0][2].into(),
             rows,
             pixels,
         }
@@ -45,7 +48,7 @@ impl<'a> Environment<'a> {
         let up = upper + (lower - upper) * in_row;
         let across = ((1.0 - up) * (1.0 + up)).max(0.0).sqrt();
         let turn = column as f64 + in_column;
-        let phi = 2.0 * PI * (turn / self.width as f64 - 0.5);
+        let phi = 2.0 * PI * (turn / self.width as f64 - 0.5 - self.rotation);
         let direction = DVec3::new(-across * phi.sin(), up, across * phi.cos()).normalize();
         let sky = Sky {
             radiance: self.radiance(turn, self.rows_below_pole(across, up)),
@@ -56,7 +59,7 @@ impl<'a> Environment<'a> {
 
     /// What comes from a direction, a unit vector.
     pub fn at(&self, direction: DVec3) -> Sky {
-        let turn = 0.5 + (-direction.x).atan2(direction.z) / (2.0 * PI);
+        let turn = (0.5 + (-direction.x).atan2(direction.z) / (2.0 * PI) + self.rotation).rem_euclid(1.0);
         let x = turn * self.width as f64;
         let y = self.rows_below_pole(direction.x.hypot(direction.z), direction.y);
         let column = (x as usize).min(self.width - 1);
@@ -128,9 +131,16 @@ mod tests {
     /// are integrals of radiance.
     #[test]
     fn directions_are_chosen_by_their_density() {
+        for degrees in [0.0, 123.0] {
+            assert_chosen_by_density(degrees);
+        }
+    }
+
+    fn assert_chosen_by_density(degrees: f64) {
         let pixel = |i: usize| [i as f32 * 0.1, 1.0, if i == 77 { 1e4 } else { 0.0 }];
         let image = Image::new(16, 9, (0..144).map(pixel).collect());
-        let table = scene::Environment::new(image).expect("an environment").table();
+        let environment = scene::Environment::new(image).expect("an environment");
+        let table = environment.rotated(degrees).table();
         let environment = Environment::of(&table);
         let count = 1 << 16;
         let (mut sampled, mut uniform) = (DVec3::ZERO, DVec3::ZERO);

@@ -22,6 +22,8 @@ const UNIFORM: f64 = 0.1;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {
     image: Image,
+    /// How far it is rotated about +Y, in turns, 0 ..= 1.
+    rotation: f64,
     /// Size of the picture that it was reduced from.
     reduced_from: Option<[usize; 2]>,
     /// Values that were negative or not finite.
@@ -33,6 +35,7 @@ impl Environment {
     pub fn constant(radiance: Vec3) -> Self {
         Self {
             image: Image::new(1, 1, vec![radiance.to_array()]),
+            rotation: 0.0,
             reduced_from: None,
             replaced: 0,
         }
@@ -80,9 +83,36 @@ impl Environment {
             .unwrap_or(1);
         Ok(Self {
             image: reduce(&image, size.map(|side| (side / factor).max(1))),
+            rotation: 0.0,
             reduced_from: (factor > 1).then_some(size),
             replaced,
         })
+    }
+
+    /// Rotated about +Y by an angle in degrees, which takes +Z towards +X.
+    #[must_use]
+    pub fn rotated(self, degrees: f64) -> Self {
+        Self {
+            rotation: (degrees / 360.0).rem_euclid(1.0),
+            ..self
+        }
+    }
+
+    /// With so many times the radiance.
+    ///
+    /// # Errors
+    /// A text, if that is more or less than radiance can be.
+    pub fn scaled(self, strength: f64) -> std::result::Result<Self, String> {
+        let scale = |value: f32| (f64::from(value) * strength) as f32;
+        let pixels: Vec<[f32; 3]> = self.image.pixels().iter().map(|pixel| pixel.map(scale)).collect();
+        let image = Image::new(self.image.width(), self.image.height(), pixels);
+        let values = || image.pixels().iter().flatten();
+        if values().any(|value| !value.is_finite()) || values().all(|&value| value == 0.0) {
+            return Err(format!(
+                "{strength} times the environment is out of floating-point range; choose another strength"
+            ));
+        }
+        Ok(Self { image, ..self })
     }
 
     /// What was done to the picture to have it rendered, one line each.
@@ -129,7 +159,7 @@ impl Environment {
     }
 
     /// The picture with the probabilities by which directions are chosen, as `glsl/shared/environment.glsl` reads it: the
-    /// size; of each row the cosines at its upper and lower edge; the pixels. w: of rows and of a row's pixels, the
+    /// size, and the rotation in turns; of each row the cosines at its upper and lower edge; the pixels. w: of rows and of a row's pixels, the
     /// probability of each and those before it.
     pub(crate) fn table(&self) -> Vec<[f32; 4]> {
         let [width, height] = self.size();
@@ -145,7 +175,8 @@ impl Environment {
             sum * self.solid_angle(row)
         });
         let edge = |row: usize| (PI * row as f64 / height as f64).cos() as f32;
-        let mut table = vec![[f32::from_bits(width as u32), f32::from_bits(height as u32), 0.0, 0.0]];
+        let size = [width, height].map(|side| f32::from_bits(side as u32));
+        let mut table = vec![[size[0], size[1], self.rotation as f32, 0.0]];
         let sums = cumulative(&of_rows.collect::<Vec<_>>());
         table.extend(
             sums.iter()
@@ -304,6 +335,17 @@ mod tests {
             environment.warnings()
         );
         assert!(environment.table().iter().flatten().all(|value| value.is_finite()));
+    }
+
+    #[test]
+    fn a_strength_multiplies_radiance_and_says_where_that_has_no_number() {
+        let environment = Environment::constant(Vec3::new(1.0, 2.0, 6.0));
+        let stronger = environment.clone().scaled(0.5).expect("an environment");
+        assert_eq!(stronger, Environment::constant(Vec3::new(0.5, 1.0, 3.0)));
+        for strength in [1e300, 1e-300] {
+            let error = environment.clone().scaled(strength).expect_err("no radiance");
+            assert!(error.contains("another strength"), "{error}");
+        }
     }
 
     #[test]

@@ -59,7 +59,7 @@ fn add_lights(scene: &mut Scene) {
         ]
     };
     let image = Image::new(32, 16, (0..512).map(pixel).collect());
-    scene.environment = Some(Environment::new(image).expect("an environment"));
+    scene.environment = Some(Environment::new(image).expect("an environment").rotated(77.0));
 }
 
 /// A scene in the device's layout.
