@@ -233,12 +233,21 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         focus: 1.0,
     });
     let half_width = half_height * width as f32 / height as f32;
+    let [right, up] = [camera.right * half_width, camera.up * half_height];
+    let larger = 2.0 * half_width.max(half_height);
+    let shift = larger * (camera.shift.x * camera.right + camera.shift.y * camera.up);
+    // Rays of a perspective camera go through the film at distance 1; those of the other kind begin on it.
+    let (position, forward) = if orthographic == 0.0 {
+        (camera.position, camera.forward + shift)
+    } else {
+        (camera.position + shift, camera.forward)
+    };
     let with = |v: glam::Vec3, w: f32| [v.x, v.y, v.z, w];
     Settings {
-        camera_position: with(camera.position, lens.radius),
-        camera_right: with(camera.right * half_width, lens.focus),
-        camera_up: with(camera.up * half_height, orthographic),
-        camera_forward: with(camera.forward, 0.0),
+        camera_position: with(position, lens.radius),
+        camera_right: with(right, lens.focus),
+        camera_up: with(up, orthographic),
+        camera_forward: with(forward, 0.0),
         resolution: config.resolution,
         slots_per_pixel: 1,
         seed: config.seed,

@@ -132,7 +132,7 @@ device_structs! {
         pub camera_right: [f32; 4],
         /// xyz: to the picture's top edge, at distance 1; w: 1 where rays are parallel, else 0.
         pub camera_up: [f32; 4],
-        /// xyz: unit vector into the picture.
+        /// xyz: into the middle of the picture, at distance 1 along the direction of view.
         pub camera_forward: [f32; 4],
         /// Pixels, width and height.
         pub resolution: [u32; 2],

@@ -3,7 +3,7 @@ layout(std140) uniform Settings {
     vec4 camera_position;       // w: radius of the lens
     vec4 camera_right;          // scaled so that ±1 is the picture's edge; w: distance of what is in focus
     vec4 camera_up;             // likewise; w: 1 where rays are parallel
-    vec4 camera_forward;        // unit; w: unused
+    vec4 camera_forward;        // to the picture's middle, at distance 1; w: unused
     uvec2 resolution;           // pixels
     uint slots_per_pixel;       // visible points a pixel
     uint seed;

@@ -13,6 +13,9 @@ use super::scene::SceneArguments;
 use crate::config::{Accel, Direct, EmissionChoice, Estimator, Sampler, TriangleTest};
 use crate::gather;
 
+/// Parts of the picture's larger side that the film is moved by at the most.
+const FARTHEST_SHIFT: f32 = 1000.0;
+
 /// Progressive photon mapping on Vulkan: a glTF scene in, an OpenEXR picture out.
 #[derive(Debug, Parser)]
 #[command(
@@ -101,6 +104,9 @@ pub struct RenderArguments {
     /// Distance along the direction of view of what is in focus, in scene units [default: of the scene's centre].
     #[arg(long, value_name = "D", requires = "aperture", allow_negative_numbers = true, value_parser = positive)]
     pub focus: Option<f64>,
+    /// Move the film to the right and up, in parts of the picture's larger side, as Blender's shift does.
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = shift)]
+    pub shift: Option<[f32; 2]>,
     /// Pixels [default: 1280 wide at the camera's aspect ratio].
     #[arg(long, value_name = "WxH", value_parser = resolution)]
     pub resolution: Option<[u32; 2]>,
@@ -186,6 +192,17 @@ pub fn resolution(text: &str) -> Result<[u32; 2], String> {
         Some(sides) if sides.iter().all(|side| (1..=crate::config::MAX_SIDE).contains(side)) => Ok(sides),
         Some(_) => Err(format!("each side must lie between 1 and {}", crate::config::MAX_SIDE)),
         None => Err("expected WIDTHxHEIGHT, such as 1280x720".to_owned()),
+    }
+}
+
+fn shift(text: &str) -> Result<[f32; 2], String> {
+    let sides = text
+        .split_once(',')
+        .and_then(|(x, y)| Some([x.trim().parse::<f32>().ok()?, y.trim().parse::<f32>().ok()?]));
+    match sides {
+        Some(sides) if sides.iter().all(|side| side.abs() <= FARTHEST_SHIFT) => Ok(sides),
+        Some(_) => Err(format!("each must lie between -{FARTHEST_SHIFT} and {FARTHEST_SHIFT}")),
+        None => Err("expected X,Y, such as 0,0.25".to_owned()),
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Error, Result};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
+use glam::Vec2;
 
 use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::outputs::{all, check_outputs};
@@ -48,6 +49,9 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let mut camera = scene.cameras[scene.camera_index(arguments.camera.as_deref())?].clone();
     if let Some(radius) = arguments.aperture {
         camera.lens = Some(scene.lens(&camera, radius, arguments.focus)?);
+    }
+    if let Some([x, y]) = arguments.shift {
+        camera.shift = Vec2::new(x, y);
     }
     let camera = &camera;
     let config = config(arguments, gather, camera);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use gltf::json::camera::{Orthographic, Perspective, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Root};
@@ -144,6 +144,7 @@ fn place(
         projection,
         aspect,
         lens: None,
+        shift: Vec2::ZERO,
     }))
 }
 
@@ -184,6 +185,7 @@ pub(super) fn framed_on((lower, upper): (Vec3, Vec3)) -> Camera {
         },
         aspect: None,
         lens: None,
+        shift: Vec2::ZERO,
     }
 }
 

@@ -297,6 +297,8 @@ pub struct Camera {
     pub aspect: Option<f32>,
     /// Its lens; a pinhole has none.
     pub lens: Option<Lens>,
+    /// How far the film is moved to the right and up, in parts of its larger side.
+    pub shift: Vec2,
 }
 
 /// A scene, ready to render.

@@ -2,10 +2,11 @@
 
 use std::f64::consts::PI;
 
-use glam::{Vec3, dvec3};
+use glam::{Vec2, Vec3, dvec3};
 use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
+use ppm_vk::film::Image;
 use ppm_vk::scene::{Environment, Projection};
 
 use crate::document::{Document, light, matte, mirror, one_sided};
@@ -146,4 +147,74 @@ fn half_a_sheet_behind_the_hidden_back_of_another_shows_half() {
     let all = Region::around([SIDE / 2; 2], SIDE / 2);
     let measured = measure(&subject, small(SIDE as u32, 100), 64, |image| vec![all.of(image, 0)]);
     measured[0].assert_is(0.5, "half a black sheet before radiance 1");
+}
+
+/// A picture twice as wide as high: its larger side is its width, and shifted by a quarter of that, a quarter of its columns or
+/// half of its rows leave it.
+#[test]
+fn a_shift_moves_the_film_by_parts_of_its_larger_side() {
+    let mut subject = shining(false);
+    let scale = subject.scene.normalisation.scale as f32;
+    let perspective = subject.scene.cameras[0].projection;
+    for projection in [perspective, Projection::Orthographic { half_height: scale }] {
+        subject.scene.cameras[0].projection = projection;
+        let mut render = |shift: Vec2, iterations: u32| {
+            subject.scene.cameras[0].shift = shift;
+            let config = RenderConfig {
+                resolution: [32, 16],
+                ..config()
+            };
+            subject.render(iterations, config)
+        };
+        let still = render(Vec2::ZERO, 1);
+        let moved = render(Vec2::new(0.25, -0.25), 1);
+        let (mut same, mut compared) = (0, 0);
+        for (x, y) in (0..24).flat_map(|x| (0..8).map(move |y| (x, y))) {
+            let at = |image: &Image, x: usize, y: usize| image.pixels()[y * 32 + x];
+            let (a, b) = (at(&still, x + 8, y + 8), at(&moved, x, y));
+            // At the rectangle's edges each pixel has its own random numbers.
+            if a == [0.0; 3] || a == [1.0; 3] {
+                compared += 1;
+                same += usize::from(a == b);
+            }
+        }
+        assert!(
+            compared > 150 && same > compared - 20,
+            "{projection:?}: {same} of {compared}"
+        );
+    }
+}
+
+/// A map whose left half shines, seen along −z, where its edges meet: −x lies left of that, and shines.
+#[test]
+fn a_rotated_environment_turns_from_z_to_x() {
+    let map = || {
+        let pixel = |i: usize| [if i % 64 < 32 { 1.0 } else { 0.25 }; 3];
+        Environment::new(Image::new(64, 32, (0..64 * 32).map(pixel).collect())).expect("an environment")
+    };
+    // The map's left half is the side of +x, unrotated; its middle line between the halves is +z.
+    for (degrees, left, right) in [
+        (0.0, 0.25, 1.0),
+        (180.0, 1.0, 0.25),
+        (90.0, 1.0, 1.0),
+        (-90.0, 0.25, 0.25),
+    ] {
+        let mut scene = Document::new("sky");
+        let black = scene.material(matte("black", [0.0; 3]));
+        scene.object(
+            "dot",
+            &Mesh::quad([[-1.0, -1.0], [1.0, -1.0], [1.0, -0.99], [-1.0, -0.99]].map(|[x, y]| dvec3(x, y, -9.0))),
+            black,
+        );
+        scene.camera([0.0, 2.0], [0.0, 0.0], 20.0);
+        let subject = subject_under(scene, Some(map().rotated(degrees)));
+        let image = subject.render(1, small(16, 100));
+        for (column, expected) in [(2, left), (13, right)] {
+            let seen = image.pixels()[2 * 16 + column][0];
+            assert!(
+                (seen - expected).abs() < 1e-5,
+                "{degrees}°, column {column}: {seen}, not {expected}"
+            );
+        }
+    }
 }
