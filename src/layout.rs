@@ -357,8 +357,9 @@ device_structs! {
         pub alias: u32,
         /// Probability of this light and those before it among the lights of its source ([`EmissionCell`]), a multiple of 2⁻²⁴.
         pub cumulative: f32,
-        /// Zero.
-        pub padding: u32,
+        /// Point, spot: radius of a disc that looks at whom it lights, render units. Directional: 1 − cos of the angle between the
+        /// middle and the edge of what is seen of it. 0: none.
+        pub extent: f32,
         /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB.
         pub intensity: [f32; 3],
         /// Spot: 1 − cos of the angle where it begins to fall off.

@@ -40,6 +40,8 @@ mod picture;
 mod prism;
 #[path = "right/references.rs"]
 mod references;
+#[path = "right/soft.rs"]
+mod soft;
 #[path = "right/stage.rs"]
 mod stage;
 #[path = "right/texture.rs"]

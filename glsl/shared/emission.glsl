@@ -36,13 +36,6 @@ vec3 direction_off(vec3 axis, float versine, float turn) {
     return normalize(basis(axis) * vec3(across * cos(phi), across * sin(phi), 1.0 - versine));
 }
 
-// A direction uniform in a cone around an axis, with 1 − cos of the angle between its sides and the axis.
-vec3 direction_in_cone(vec3 axis, float versine, vec2 u) {
-    vec2 p = disc_point(u);
-    float off = dot(p, p) * versine;
-    return normalize(basis(axis) * vec3(p * sqrt(max(0.0, versine * (2.0 - off))), 1.0 - off));
-}
-
 // The cone in which a sphere is seen.
 struct Cone {
     vec3 axis;
@@ -71,7 +64,22 @@ float spot_versine(PunctualLight light, float u, out float solid_angle) {
                                      : whole - from_outside;
 }
 
-AimedStart emit_directional(PunctualLight light, float area, vec2 place, Target target) {
+// From a disc across the rays that covers the target, or the scene, where rays of many directions come from afar.
+AimedStart emit_from_afar(vec3 towards, vec3 irradiance, float area, vec2 place, Target target) {
+    // The sphere around the scene has the disc across the light that `area` is.
+    float scene_radius = sqrt(area / PI);
+    float radius = target.everything ? scene_radius : target.sphere.w;
+    vec3 passed = target.sphere.xyz + basis(-towards) * vec3(radius * disc_point(place), 0.0);
+    vec3 origin = passed + towards * (scene_radius - dot(target.sphere.xyz, towards));
+    float disc = target.everything ? area : PI * radius * radius;
+    return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0), passed, true, true);
+}
+
+AimedStart emit_directional(PunctualLight light, float area, vec2 place, vec2 turn, Target target) {
+    if (SOFT_LIGHTS && light.extent > 0.0) {
+        vec3 towards = direction_in_cone(-light.direction, light.extent, turn);
+        return emit_from_afar(towards, light.intensity, area, place, target);
+    }
     // A disc across the rays that covers the target, or the scene.
     vec3 centre = target.everything ? light.position : target.sphere.xyz;
     float radius = target.everything ? sqrt(area / PI) : target.sphere.w;
@@ -88,20 +96,14 @@ AimedStart emit_directional(PunctualLight light, float area, vec2 place, Target 
 AimedStart emit_environment(float area, vec2 place, vec2 direction, Target target) {
     vec3 towards;
     Sky sky = sample_environment(direction, towards);
-    // The sphere around the scene has the disc across the light that `area` is.
-    float scene_radius = sqrt(area / PI);
-    float radius = target.everything ? scene_radius : target.sphere.w;
-    vec3 passed = target.sphere.xyz + basis(-towards) * vec3(radius * disc_point(place), 0.0);
-    vec3 origin = passed + towards * (scene_radius - dot(target.sphere.xyz, towards));
-    float disc = target.everything ? area : PI * radius * radius;
-    return AimedStart(Emission(origin, -towards, sky.radiance * (disc / sky.density), NO_TRIANGLE, 0.0), passed, true,
-                      true);
+    return emit_from_afar(towards, sky.radiance / sky.density, area, place, target);
 }
 
-AimedStart emit_point(PunctualLight light, uint kind, vec2 u, Target target) {
+AimedStart emit_point(PunctualLight light, uint kind, vec2 place, vec2 u, Target target) {
     Cone cone = Cone(vec3(0.0, 0.0, 1.0), 2.0);
     if (!target.everything) {
-        cone = cone_of(target.sphere, light.position);
+        // Rays from anywhere on the light's disc.
+        cone = cone_of(target.sphere + vec4(vec3(0.0), light.extent), light.position);
     }
     float solid_angle = 2.0 * PI * cone.versine;
     vec3 intensity = light.intensity;
@@ -125,8 +127,13 @@ AimedStart emit_point(PunctualLight light, uint kind, vec2 u, Target target) {
             intensity *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
         }
     }
-    return AimedStart(Emission(light.position, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range),
-                      light.position, false, on_target);
+    vec3 origin = light.position;
+    if (SOFT_LIGHTS && light.extent > 0.0) {
+        origin += basis(direction) * vec3(light.extent * disc_point(place), 0.0);
+        on_target = false;
+    }
+    return AimedStart(Emission(origin, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range), origin, false,
+                      on_target);
 }
 
 // Where a sphere takes up more than this of the directions, sin² of its cone's angle, they are chosen by their cosine.
@@ -166,9 +173,9 @@ AimedStart emit_from(uint index, vec2 place, vec2 direction, float side, Target 
     if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
         PunctualLight punctual = punctual_light_at(index);
         if (light.kind == DIRECTIONAL_LIGHT) {
-            return emit_directional(punctual, light.area, place, target);
+            return emit_directional(punctual, light.area, place, direction, target);
         }
-        return emit_point(punctual, light.kind, direction, target);
+        return emit_point(punctual, light.kind, place, direction, target);
     }
     if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
         return emit_environment(light.area, place, direction, target);

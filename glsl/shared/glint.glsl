@@ -1,4 +1,5 @@
-// What narrow lobes show of lights without extent, which no direction of theirs meets. Include after alpha.glsl, bsdf.glsl,
+// What narrow lobes show of lights that are no surfaces, which no direction of theirs meets, and what a ray sees of those that
+// have an extent. Include after alpha.glsl, bsdf.glsl,
 // contact.glsl and light.glsl.
 
 const uint GLINT = 0x676c696eu; // of numbers that belong to it; no instance has that index
@@ -46,6 +47,10 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
     vec3 u = vec3(number_of(random, uvec2(0u, GLINT)), number_of(random, uvec2(1u, GLINT)),
                   number_of(random, uvec2(2u, GLINT)));
     uint chosen = choose_light(u.x, u.yz).index;
+    vec2 place = vec2(0.0);
+    if (SOFT_LIGHTS) {
+        place = vec2(number_of(random, uvec2(3u, GLINT)), number_of(random, uvec2(4u, GLINT)));
+    }
     bool of_one = settings.slots_per_pixel == 1u;
     uint begin = of_one ? chosen : 0u;
     uint end = of_one ? chosen + 1u : settings.light_count;
@@ -57,8 +62,8 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
             continue;
         }
         PunctualLight lamp = punctual_light_at(i);
-        vec3 origin = origin_towards(met.surface, arriving_from(lamp, light.kind, met.surface.position).ray);
-        Arriving arriving = arriving_from(lamp, light.kind, origin);
+        vec3 origin = origin_towards(met.surface, arriving_from(lamp, light.kind, met.surface.position, place).ray);
+        Arriving arriving = arriving_from(lamp, light.kind, origin, place);
         vec3 l = normalize(arriving.ray);
         float nl = dot(l, facing.shading_normal);
         bool same_side = dot(l, facing.geometric_normal) > 0.0;
@@ -78,6 +83,39 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
             seen = trace_visible(origin, arriving.ray, arriving.end, NO_TRIANGLE, true, false, random).triangle == MISS;
         }
         sum += seen ? response : vec3(0.0);
+    }
+    return sum;
+}
+
+// Radiance of lights with an extent that a ray meets within `end` lengths of its unit direction. They follow after the triangles.
+vec3 soft_lights_along(vec3 origin, vec3 direction, float end, uint medium) {
+    vec3 sum = vec3(0.0);
+    for (uint i = settings.light_count; i > 0u && light_at(i - 1u).kind != TRIANGLE_LIGHT; i--) {
+        loop_count += 1u;
+        uint kind = light_at(i - 1u).kind;
+        PunctualLight light = punctual_light_at(i - 1u);
+        if (!is_punctual(kind) || light.extent <= 0.0) {
+            continue;
+        }
+        bool distant = kind == DIRECTIONAL_LIGHT;
+        vec3 to_middle = light.position - origin;
+        float way = distant ? 1e30 : dot(to_middle, direction);
+        vec3 off_axis = distant ? direction + light.direction : to_middle - way * direction;
+        float off2 = dot(off_axis, off_axis);
+        bool met = distant ? 0.5 * off2 <= light.extent && end >= 1e30
+                           : off2 <= light.extent * light.extent && way > 0.0 && way < end;
+        if (met) {
+            float area = distant ? 2.0 * PI * light.extent : PI * light.extent * light.extent;
+            vec3 radiance = light.intensity / area;
+            if (!distant) {
+                radiance *= range_window(light.inverse_range, way);
+            }
+            if (kind == SPOT_LIGHT) {
+                vec3 off_spot = direction + light.direction;
+                radiance *= spot_falloff(light, 0.5 * dot(off_spot, off_spot));
+            }
+            sum += radiance * transmittance(medium, way);
+        }
     }
     return sum;
 }

@@ -16,7 +16,7 @@ struct Light {
     uint kind;
 };
 
-// The rest of `layout::Light`, without the second texel: the table's cell, and the light's place within its source.
+// The rest of `layout::Light`, without the table's cell and the light's place within its source.
 struct PunctualLight {
     vec3 intensity;      // point, spot: along the axis. Directional: irradiance across the rays
     vec3 position;       // directional: centre of the disc
@@ -24,6 +24,7 @@ struct PunctualLight {
     float inner;         // spot: 1 − cos of the angle where it begins to fall off
     float outer;         // spot: 1 − cos of the angle where it ends
     float inverse_range; // point, spot: 0 where it has no range
+    float extent;        // of some: a disc's radius; directional: 1 − cos of the angle between its middle and its edge
 };
 
 uniform usamplerBuffer Lights;
@@ -39,8 +40,12 @@ PunctualLight punctual_light_at(uint i) {
     vec4 intensity_inner = TEXEL(Lights, LIGHT_TEXELS * i + 2u);
     vec4 position_outer = TEXEL(Lights, LIGHT_TEXELS * i + 3u);
     vec4 direction_range = TEXEL(Lights, LIGHT_TEXELS * i + 4u);
+    float extent = 0.0;
+    if (SOFT_LIGHTS) {
+        extent = TEXEL(Lights, LIGHT_TEXELS * i + 1u).w;
+    }
     return PunctualLight(intensity_inner.rgb, position_outer.xyz, direction_range.xyz, intensity_inner.w,
-                         position_outer.w, direction_range.w);
+                         position_outer.w, direction_range.w, extent);
 }
 
 bool is_punctual(uint kind) {
@@ -81,23 +86,41 @@ float range_window(float inverse_range, float distance) {
     return clamp(1.0 - part2 * part2, 0.0, 1.0);
 }
 
-// What reaches a point from a punctual light if nothing is between.
+// What reaches a point from a punctual light, or a place of it that u chooses, if nothing is between.
 struct Arriving {
     vec3 ray;        // to the light, or towards where it comes from
     float end;       // of the ray, in its lengths
     vec3 irradiance; // across the ray
 };
 
-Arriving arriving_from(PunctualLight light, uint kind, vec3 point) {
+Arriving arriving_from(PunctualLight light, uint kind, vec3 point, vec2 u) {
+    Arriving arriving;
     if (kind == DIRECTIONAL_LIGHT) {
-        return Arriving(-light.direction, 1e30, light.intensity);
+        arriving = Arriving(-light.direction, 1e30, light.intensity);
+        if (SOFT_LIGHTS && light.extent > 0.0) {
+            arriving.ray = direction_in_cone(arriving.ray, light.extent, u);
+        }
+    } else {
+        vec3 ray = light.position - point;
+        float distance2 = max(dot(ray, ray), 1e-37);
+        float area_over_angle = distance2; // of the light as it is seen
+        if (SOFT_LIGHTS && light.extent > 0.0) {
+            // A disc that looks here is seen as a sphere is, and from within its radius in half of all directions.
+            float radius2 = light.extent * light.extent;
+            float sin2 = radius2 / distance2;
+            float versine = sin2 < 1.0 ? sin2 / (1.0 + sqrt(1.0 - sin2)) : 1.0;
+            vec3 towards = direction_in_cone(ray * inversesqrt(distance2), versine, u);
+            float way = max(dot(towards, ray), 1e-18);
+            ray = way * towards;
+            distance2 = way * way;
+            area_over_angle = radius2 / (2.0 * versine);
+        }
+        vec3 irradiance = light.intensity * (range_window(light.inverse_range, sqrt(distance2)) / area_over_angle);
+        if (kind == SPOT_LIGHT) {
+            vec3 off_axis = ray * inversesqrt(distance2) + light.direction;
+            irradiance *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
+        }
+        arriving = Arriving(ray, 1.0, irradiance);
     }
-    vec3 ray = light.position - point;
-    float distance2 = max(dot(ray, ray), 1e-37);
-    vec3 irradiance = light.intensity * (range_window(light.inverse_range, sqrt(distance2)) / distance2);
-    if (kind == SPOT_LIGHT) {
-        vec3 off_axis = ray * inversesqrt(distance2) + light.direction;
-        irradiance *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
-    }
-    return Arriving(ray, 1.0, irradiance);
+    return arriving;
 }

@@ -27,6 +27,13 @@ vec3 cosine_direction(vec3 n, vec2 u) {
     return normalize(basis(n) * vec3(p, sqrt(max(0.0, 1.0 - dot(p, p)))));
 }
 
+// A direction uniform in a cone around an axis, with 1 − cos of the angle between its sides and the axis.
+vec3 direction_in_cone(vec3 axis, float versine, vec2 u) {
+    vec2 p = disc_point(u);
+    float off = dot(p, p) * versine;
+    return normalize(basis(axis) * vec3(p * sqrt(max(0.0, versine * (2.0 - off))), 1.0 - off));
+}
+
 // Barycentric coordinates (u, v) of a point uniform on a triangle.
 vec2 triangle_point(vec2 u) {
     float s = sqrt(u.x);

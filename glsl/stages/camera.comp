@@ -53,6 +53,7 @@ struct Branch {
     float wavelength;     // nm; 0: of all
     bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
     bool emission_seen;   // what the next surface emits
+    bool lamps_seen;      // what lights with an extent send along the ray
 };
 
 // What a ray sees that meets no surface.
@@ -63,19 +64,28 @@ vec3 radiance_from_afar(vec3 direction) {
     return vec3(0.0);
 }
 
+// Lengths of a ray's direction up to what it met.
+float way_of(Hit hit) {
+    return hit.triangle == MISS ? 1e30 : hit.t;
+}
+
 // The first surface on a ray's way.
 struct Glimpse {
     vec3 emission;
     bool dark; // nothing is there that scatters light
 };
 
-Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, Media media, Random random) {
+Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, Media media, bool lamps_seen, Random random) {
     Hit hit = trace_visible(origin, direction, 1e30, ignored, false, false, random);
     if (loops_cut) {
         return Glimpse(vec3(0.0), true);
     }
+    vec3 lamps = vec3(0.0);
+    if (SOFT_LIGHTS && !lamps_seen) {
+        lamps = soft_lights_along(origin, direction, way_of(hit), media.first);
+    }
     if (hit.triangle == MISS) {
-        return Glimpse(radiance_from_afar(direction), true);
+        return Glimpse(radiance_from_afar(direction) + lamps, true);
     }
     Encounter met = encounter(hit, direction, media, random);
     bool dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
@@ -85,7 +95,7 @@ Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, Media media
     if (ABSORPTION) {
         emission *= transmittance(met.through.first, hit.t);
     }
-    return Glimpse(emission, dark);
+    return Glimpse(emission + lamps, dark);
 }
 
 // Follows what a boundary of microfacets reflects, or none of it where that would fly into the surface.
@@ -139,6 +149,7 @@ void main() {
     branch.wavelength = 0.0;
     branch.reflection_seen = false;
     branch.emission_seen = false;
+    branch.lamps_seen = false;
 
     bool alive = inside;
     bool cut = false;
@@ -149,6 +160,10 @@ void main() {
         bool ended = true;
         visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
         Hit hit = trace_visible(branch.origin, branch.direction, 1e30, branch.ignored, false, branch.depth == 0u, random);
+        if (SOFT_LIGHTS && !loops_cut && !branch.lamps_seen && !branch.emission_seen) {
+            branch.emitted += branch.throughput *
+                              soft_lights_along(branch.origin, branch.direction, way_of(hit), branch.media.first);
+        }
         if (loops_cut) {
             cut = true;
         } else if (hit.triangle != MISS) {
@@ -194,6 +209,7 @@ void main() {
                 ended = false;
                 branch.depth += 1u;
                 branch.ignored = surface.triangle;
+                branch.lamps_seen = false;
                 u = next4(random);
                 if (is_mirror(material)) {
                     float cosine = dot(viewer, facing.shading_normal);
@@ -205,6 +221,7 @@ void main() {
                 } else if (is_glossy(material)) {
                     if (PUNCTUAL_LIGHTS && reflector.alpha >= SMOOTH_ALPHA) {
                         branch.emitted += branch.throughput * glint(met, material, facing, reflector, viewer, random);
+                        branch.lamps_seen = true;
                     }
                     Branch reflected = branch;
                     float p = reflection_probability(reflector, dot(viewer, facing.shading_normal));
@@ -231,6 +248,7 @@ void main() {
                     if (PUNCTUAL_LIGHTS && is_rough_glass(material)) {
                         branch.emitted +=
                             branch.throughput * glint(met, material, facing, reflector, viewer, random);
+                        branch.lamps_seen = true;
                     }
                     Boundary boundary = meet_boundary(facing, branch.direction, material, met.outside, u.yz);
                     // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
@@ -252,7 +270,8 @@ void main() {
                         // A lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
                         branch.reflection_seen = true;
                         vec3 from = origin_towards(surface, boundary.reflected);
-                        Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle, met.through, random);
+                        Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle, met.through,
+                                                     branch.lamps_seen, random);
                         branch.emitted += branch.throughput * boundary.reflectance * boundary.reflected_weight *
                                           reflection.emission;
                         if (reflection.dark) {

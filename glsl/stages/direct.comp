@@ -84,7 +84,7 @@ Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
     question.end = 1e30;
     question.ignored = NO_TRIANGLE;
     if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
-        Arriving arriving = arriving_from(punctual_light_at(chosen), light.kind, origin);
+        Arriving arriving = arriving_from(punctual_light_at(chosen), light.kind, origin, u.yz);
         question.ray = arriving.ray;
         question.end = arriving.end;
         question.irradiance = arriving.irradiance / light.probability;

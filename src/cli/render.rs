@@ -58,12 +58,12 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let packed = while_showing(BUILDING, quiet, || PackedScene::new(&scene))
         .map_err(|what| crate::error::Error::scene(path, what))?;
     let features = &packed.features;
-    let chooses = features.dispersion || features.alpha || features.partly_clear || features.coat;
+    let chooses = features.dispersion || features.alpha || features.partly_clear || features.coat || features.soft;
     if config.estimator == Estimator::Ppm && chooses {
         say!(
-            "warning: --estimator ppm finds visible points once: where a wavelength, alpha, a coat or a part of the light is chosen \
-             by chance, each pixel keeps its first choice, and the picture stays grainy there, however long it renders; use \
-             --estimator sppm"
+            "warning: --estimator ppm finds visible points once: where a wavelength, alpha, a coat, a part of the light or a place \
+             on a lamp is chosen by chance, each pixel keeps its first choice, and the picture stays grainy there, however long it \
+             renders; use --estimator sppm"
         );
     }
     let mut backend = open(backend_choice, arguments.device.as_deref(), &packed, camera, &config)?;

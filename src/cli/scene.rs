@@ -45,6 +45,12 @@ pub struct SceneArguments {
     /// [default: thin walls, as glTF has it].
     #[arg(long)]
     solid_glass: bool,
+    /// Diameter of directional lights as seen from here, in degrees: shadows have soft edges, and mirrors show a disc.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, value_parser = sun_angle)]
+    sun_angle: f64,
+    /// Radius of points and spots, in scene units: they shine, and are seen, as balls.
+    #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = light_radius)]
+    light_radius: f64,
     /// Apply the scene's animations at this time, in seconds [default: everything at rest].
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     frame_time: Option<f64>,
@@ -103,6 +109,8 @@ impl SceneArguments {
             scene: self.scene_name.clone(),
             light_units: self.light_units,
             solid_glass: self.solid_glass,
+            sun_angle: self.sun_angle,
+            light_radius: self.light_radius,
         };
         Ok(while_showing(READING, quiet, || Scene::load_with(path, options))?)
     }
@@ -129,6 +137,24 @@ fn environment(text: &str) -> Result<EnvironmentChoice, String> {
         Ok(EnvironmentChoice::Constant(radiance))
     } else {
         Err("a radiance must be finite and not negative, and above 0 in one channel".to_owned())
+    }
+}
+
+fn sun_angle(text: &str) -> Result<f64, String> {
+    let degrees = number(text)?;
+    if (0.0..=180.0).contains(&degrees) {
+        Ok(degrees)
+    } else {
+        Err("must lie between 0 and 180".to_owned())
+    }
+}
+
+fn light_radius(text: &str) -> Result<f64, String> {
+    let radius = number(text)?;
+    if radius >= 0.0 && radius.is_finite() {
+        Ok(radius)
+    } else {
+        Err("must be finite and not negative".to_owned())
     }
 }
 

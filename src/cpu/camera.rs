@@ -10,7 +10,7 @@ use super::boundary::Boundary;
 use super::contact::{Encounter, choose_part, is_mixed};
 use super::dispersion::disperse;
 use super::environment::Environment;
-use super::glint::glint;
+use super::glint::{glint, soft_lights_along};
 use super::gloss::Reflector;
 use super::intersect::{PlacedTriangle, Ray};
 use super::light::{emits, emitted_radiance};
@@ -43,6 +43,8 @@ struct Branch {
     reflection_seen: bool,
     /// What the next surface emits has been seen.
     emission_seen: bool,
+    /// What lights with an extent send along the ray has been seen.
+    lamps_seen: bool,
 }
 
 /// Radiance of the first surface on a ray's way, and whether nothing is there that scatters light.
@@ -51,22 +53,27 @@ fn glimpse(
     ray: Ray,
     ignored: Option<PlacedTriangle>,
     media: Media,
+    lamps_seen: bool,
     random: &Random,
 ) -> (DVec3, bool) {
-    let Some(hit) = nearest_visible(inputs, ray, FAR, ignored, random) else {
-        return (
-            Environment::of(&inputs.scene.environment).at(ray.direction).radiance,
-            true,
-        );
+    let hit = nearest_visible(inputs, ray, FAR, ignored, random);
+    let lamps = if lamps_seen {
+        DVec3::ZERO
+    } else {
+        soft_lights_along(inputs, ray, hit.map_or(FAR, |hit| hit.t), media)
+    };
+    let Some(hit) = hit else {
+        let sky = Environment::of(&inputs.scene.environment).at(ray.direction);
+        return (sky.radiance + lamps, true);
     };
     let met = Encounter::new(inputs, hit, ray.direction, media, random);
     let material = met.surface.material;
     let dark = material.surface == MATTE && rgb(material.base_color).max_element() == 0.0;
     if emits(&material, met.facing.front) {
         let emission = emitted_radiance(&material, -ray.direction.dot(met.facing.geometric_normal));
-        (emission * transmittance(inputs, met.through, hit.t), dark)
+        (emission * transmittance(inputs, met.through, hit.t) + lamps, dark)
     } else {
-        (DVec3::ZERO, dark)
+        (lamps, dark)
     }
 }
 
@@ -219,12 +226,18 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
         wavelength: None,
         reflection_seen: false,
         emission_seen: false,
+        lamps_seen: false,
     }];
     let mut used = 0;
     while let Some(mut branch) = pending.pop() {
         let slot = loop {
             let culls = branch.depth == 0;
-            let Some(hit) = nearest_seen(inputs, branch.ray, FAR, branch.ignored, culls, &random) else {
+            let hit = nearest_seen(inputs, branch.ray, FAR, branch.ignored, culls, &random);
+            if !branch.lamps_seen && !branch.emission_seen {
+                let end = hit.map_or(FAR, |hit| hit.t);
+                branch.emitted += branch.throughput * soft_lights_along(inputs, branch.ray, end, branch.media);
+            }
+            let Some(hit) = hit else {
                 if !branch.emission_seen {
                     let sky = Environment::of(&inputs.scene.environment).at(branch.ray.direction);
                     branch.emitted += branch.throughput * sky.radiance;
@@ -278,11 +291,13 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
             }
             branch.depth += 1;
             branch.ignored = Some(surface.triangle);
+            branch.lamps_seen = false;
             let [choice, second, third, _] = random.next4();
             if is_glossy {
                 if inputs.scene.features.punctual && !reflector.is_smooth() {
                     let seen = glint(inputs, &met, &material, &facing, &reflector, incoming, &random);
                     branch.emitted += branch.throughput * seen;
+                    branch.lamps_seen = true;
                 }
                 let p = reflector.reflection_probability(-incoming.dot(facing.shading_normal));
                 let (direction, weight) = facing.follow(&reflector, incoming, [second, third]);
@@ -323,6 +338,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                 if inputs.scene.features.punctual && !Reflector::microfacets_of(&material).is_smooth() {
                     let seen = glint(inputs, &met, &material, &facing, &reflector, incoming, &random);
                     branch.emitted += branch.throughput * seen;
+                    branch.lamps_seen = true;
                 }
                 let boundary = Boundary::new(&facing, incoming, &material, met.outside, [second, third]);
                 // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
@@ -352,7 +368,8 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                                 origin: surface.origin_towards(boundary.reflected),
                                 direction: boundary.reflected,
                             };
-                            let (emission, dark) = glimpse(inputs, ray, Some(surface.triangle), met.through, &random);
+                            let (ignored, lamps_seen) = (Some(surface.triangle), branch.lamps_seen);
+                            let (emission, dark) = glimpse(inputs, ray, ignored, met.through, lamps_seen, &random);
                             branch.emitted +=
                                 branch.throughput * boundary.reflectance * boundary.reflected_weight * emission;
                             if dark {

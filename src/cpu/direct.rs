@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::camera::SeenSlice;
@@ -219,7 +219,7 @@ fn sample_direct(
     } else {
         let light = choose_light(&inputs.scene.lights, choice, [first_digits, second_digits]).light;
         if is_punctual(light) {
-            let Arriving { ray, end, irradiance } = arriving_from(light, origin);
+            let Arriving { ray, end, irradiance } = arriving_from(light, origin, DVec2::new(u, v));
             return look_for(ray, end, None).map_or(nothing, |seen| {
                 seen.of(response(ray.normalize()) * irradiance / (f64::from(light.probability) * (1.0 - q)))
             });

@@ -8,7 +8,7 @@ use super::Inputs;
 use super::environment::Environment;
 use super::intersect::{PlacedTriangle, Ray};
 use super::light::{Choice, choose_light, emits, emitted_radiance, spot_falloff};
-use super::sampling::{basis, cosine_direction, disc_point, triangle_point};
+use super::sampling::{basis, cosine_direction, direction_in_cone, disc_point, triangle_point};
 use super::surface::{offset_origin, surface_at};
 use super::texture::{apply_textures, share_there};
 use super::vector::rgb;
@@ -141,7 +141,11 @@ fn from_light(
     target: Option<Sphere>,
 ) -> Start {
     match light.kind {
-        POINT_LIGHT | SPOT_LIGHT => from_point(light, direction, target),
+        POINT_LIGHT | SPOT_LIGHT => from_point(light, place, direction, target),
+        DIRECTIONAL_LIGHT if light.extent > 0.0 => {
+            let towards = direction_in_cone(-rgb(light.direction), light.extent.into(), direction);
+            through_sphere(light, towards, rgb(light.intensity), place, target)
+        }
         DIRECTIONAL_LIGHT => {
             let flight = rgb(light.direction);
             let plane = rgb(light.position);
@@ -158,18 +162,23 @@ fn from_light(
         ENVIRONMENT_LIGHT => {
             let environment = Environment::of(&inputs.scene.environment);
             let (towards, sky) = environment.sample(direction.x, direction.y);
-            let scene = Sphere {
-                centre: DVec3::ZERO,
-                radius: (f64::from(light.area) / PI).sqrt(),
-            };
-            let disc = target.unwrap_or(scene);
-            let area = target.map_or(f64::from(light.area), |target| PI * target.radius.powi(2));
-            let passed = point_across(disc, -towards, place);
-            let origin = passed + towards * (scene.radius - disc.centre.dot(towards));
-            from_afar(passed, origin, -towards, sky.radiance * area / sky.density)
+            through_sphere(light, towards, sky.radiance / sky.density, place, target)
         }
         _ => from_triangle(inputs, light, place, direction, side, target),
     }
+}
+
+/// Through a disc across the rays that covers the target, or the scene, where rays of many directions come from afar.
+fn through_sphere(light: &Light, towards: DVec3, irradiance: DVec3, place: DVec2, target: Option<Sphere>) -> Start {
+    let scene = Sphere {
+        centre: DVec3::ZERO,
+        radius: (f64::from(light.area) / PI).sqrt(),
+    };
+    let disc = target.unwrap_or(scene);
+    let area = target.map_or(f64::from(light.area), |target| PI * target.radius.powi(2));
+    let passed = point_across(disc, -towards, place);
+    let origin = passed + towards * (scene.radius - disc.centre.dot(towards));
+    from_afar(passed, origin, -towards, irradiance * area)
 }
 
 fn from_afar(passed: DVec3, origin: DVec3, direction: DVec3, flux: DVec3) -> Start {
@@ -187,9 +196,15 @@ fn point_across(sphere: Sphere, direction: DVec3, u: DVec2) -> DVec3 {
     sphere.centre + basis(direction) * (sphere.radius * disc_point(u.x, u.y)).extend(0.0)
 }
 
-fn from_point(light: &Light, u: DVec2, target: Option<Sphere>) -> Start {
+fn from_point(light: &Light, place: DVec2, u: DVec2, target: Option<Sphere>) -> Start {
     let position = rgb(light.position);
-    let (axis, versine) = target.map_or((DVec3::Z, 2.0), |target| target.cone(position));
+    // Rays from anywhere on the light's disc.
+    let extent = f64::from(light.extent);
+    let wider = target.map(|target| Sphere {
+        radius: target.radius + extent,
+        ..target
+    });
+    let (axis, versine) = wider.map_or((DVec3::Z, 2.0), |target| target.cone(position));
     let is_spot = light.kind == SPOT_LIGHT;
     let (off_spot, spot_solid_angle) = if is_spot { spot_versine(light, u.x) } else { (0.0, 0.0) };
     let mut solid_angle = 2.0 * PI * versine;
@@ -207,15 +222,19 @@ fn from_point(light: &Light, u: DVec2, target: Option<Sphere>) -> Start {
         }
         direction
     };
+    let disc = Sphere {
+        centre: position,
+        radius: extent,
+    };
     Start {
         ray: Ray {
-            origin: position,
+            origin: point_across(disc, direction, place),
             direction,
         },
         flux: rgb(light.intensity) * (falloff * solid_angle),
         ignored: None,
         passed: None,
-        on_target: !by_intensity,
+        on_target: !by_intensity && extent == 0.0,
     }
 }
 
@@ -262,13 +281,6 @@ fn from_triangle(
         passed: None,
         on_target: narrow.is_some(),
     }
-}
-
-/// A direction uniform in a cone around an axis, with 1 − cos of the angle between its sides and the axis.
-fn direction_in_cone(axis: DVec3, versine: f64, u: DVec2) -> DVec3 {
-    let p = disc_point(u.x, u.y);
-    let off = p.length_squared() * versine;
-    (basis(axis) * (p * (versine * (2.0 - off)).max(0.0).sqrt()).extend(1.0 - off)).normalize()
 }
 
 /// A direction around an axis, with 1 − cos of the angle between them.

@@ -1,13 +1,14 @@
-//! What narrow lobes show of lights without extent, which no direction of theirs meets: `glsl/shared/glint.glsl` in f64.
+//! What narrow lobes show of lights that are no surfaces, which no direction of theirs meets, and what a ray sees of those that
+//! have an extent: `glsl/shared/glint.glsl` in f64.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::boundary::{Boundary, fresnel_dielectric};
 use super::contact::Encounter;
 use super::gloss::Reflector;
 use super::intersect::Ray;
-use super::light::{Arriving, arriving_from, choose_light, is_punctual};
-use super::media::transmittance;
+use super::light::{Arriving, arriving_from, choose_light, is_punctual, soft_light_along};
+use super::media::{Media, transmittance};
 use super::surface::{DIELECTRIC, Facing};
 use super::texture::nearest_visible;
 use super::{FAR, Inputs};
@@ -28,7 +29,8 @@ pub(super) fn glint(
     random: &Random,
 ) -> DVec3 {
     // Apart from the path's own numbers: those are the same where there is nothing to ask.
-    let [u, first_digits, second_digits] = [0, 1, 2].map(|number| random.number_of([number, GLINT]));
+    let [u, first_digits, second_digits, x, y] = [0, 1, 2, 3, 4].map(|number| random.number_of([number, GLINT]));
+    let place = DVec2::new(x, y);
     let lights = &inputs.scene.lights;
     let chosen = choose_light(lights, u, [first_digits, second_digits]).light;
     let of_one = inputs.settings.slots_per_pixel == 1;
@@ -40,8 +42,8 @@ pub(super) fn glint(
     let from = |light: &Light| {
         let origin = met
             .surface
-            .origin_towards(arriving_from(light, met.surface.position).ray);
-        let Arriving { ray, end, irradiance } = arriving_from(light, origin);
+            .origin_towards(arriving_from(light, met.surface.position, place).ray);
+        let Arriving { ray, end, irradiance } = arriving_from(light, origin, place);
         let direction = ray.normalize();
         let cosine = direction.dot(facing.shading_normal);
         let same_side = direction.dot(facing.geometric_normal) > 0.0;
@@ -66,6 +68,18 @@ pub(super) fn glint(
         response
     };
     asked.iter().filter(|light| is_punctual(light)).map(from).sum()
+}
+
+/// Radiance of lights with an extent that a ray along a unit vector meets within `end`.
+pub(super) fn soft_lights_along(inputs: &Inputs<'_>, ray: Ray, end: f64, media: Media) -> DVec3 {
+    if !inputs.scene.features.soft {
+        return DVec3::ZERO;
+    }
+    let met = |light: &Light| {
+        let (radiance, way) = soft_light_along(light, ray.origin, ray.direction)?;
+        (way < end || end >= FAR).then(|| radiance * transmittance(inputs, media, way))
+    };
+    inputs.scene.lights.iter().filter_map(met).sum()
 }
 
 /// BSDF · cos of a rough boundary of glass without its tint, as [`Boundary::new`] draws it: Walter and others, «Microfacet Models for Refraction

@@ -1,8 +1,11 @@
 //! Lights: `glsl/shared/light.glsl`.
 
-use glam::DVec3;
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
 
 use super::gloss::coat_passes;
+use super::sampling::direction_in_cone;
 use super::vector::rgb;
 use crate::alias::{self, AliasCell};
 use crate::layout::{BACK_EMITS, DIRECTIONAL_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT};
@@ -35,7 +38,7 @@ pub(super) fn emitted_radiance(material: &Material, cosine: f64) -> DVec3 {
     coat_passes(f64::from(material.coat), cosine) * rgb(material.emission)
 }
 
-/// Whether it has no extent.
+/// Whether it is no surface and no environment.
 pub(super) fn is_punctual(light: &Light) -> bool {
     [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&light.kind)
 }
@@ -52,7 +55,7 @@ pub(super) fn range_window(inverse_range: f64, distance: f64) -> f64 {
     (1.0 - (distance * inverse_range).powi(4)).clamp(0.0, 1.0)
 }
 
-/// What reaches a point from a punctual light if nothing is between.
+/// What reaches a point from a punctual light, or a place of it, if nothing is between.
 pub(super) struct Arriving {
     /// To the light, or towards where it comes from.
     pub ray: DVec3,
@@ -62,17 +65,39 @@ pub(super) struct Arriving {
     pub irradiance: DVec3,
 }
 
-/// [`Arriving`] of a light for which [`is_punctual`] holds.
-pub(super) fn arriving_from(light: &Light, point: DVec3) -> Arriving {
+/// [`Arriving`] of a light for which [`is_punctual`] holds; `u` chooses the place of one with an extent.
+pub(super) fn arriving_from(light: &Light, point: DVec3, u: DVec2) -> Arriving {
+    let extent = f64::from(light.extent);
     if light.kind == DIRECTIONAL_LIGHT {
+        let towards = -rgb(light.direction);
         return Arriving {
-            ray: -rgb(light.direction),
+            ray: if extent > 0.0 {
+                direction_in_cone(towards, extent, u)
+            } else {
+                towards
+            },
             end: super::FAR,
             irradiance: rgb(light.intensity),
         };
     }
-    let ray = rgb(light.position) - point;
-    let distance2 = ray.length_squared().max(1e-37);
+    let mut ray = rgb(light.position) - point;
+    let mut distance2 = ray.length_squared().max(1e-37);
+    // Of the light as it is seen.
+    let mut area_over_angle = distance2;
+    if extent > 0.0 {
+        // A disc that looks here is seen as a sphere is, and from within its radius in half of all directions.
+        let sin2 = extent * extent / distance2;
+        let versine = if sin2 < 1.0 {
+            sin2 / (1.0 + (1.0 - sin2).sqrt())
+        } else {
+            1.0
+        };
+        let towards = direction_in_cone(ray / distance2.sqrt(), versine, u);
+        let way = towards.dot(ray).max(1e-18);
+        ray = way * towards;
+        distance2 = way * way;
+        area_over_angle = extent * extent / (2.0 * versine);
+    }
     let falloff = if light.kind == SPOT_LIGHT {
         spot_falloff(
             light,
@@ -85,8 +110,33 @@ pub(super) fn arriving_from(light: &Light, point: DVec3) -> Arriving {
         ray,
         end: 1.0,
         irradiance: rgb(light.intensity)
-            * (falloff * range_window(light.inverse_range.into(), distance2.sqrt()) / distance2),
+            * (falloff * range_window(light.inverse_range.into(), distance2.sqrt()) / area_over_angle),
     }
+}
+
+/// Radiance of a light with an extent where a ray along a unit vector meets it, and how far away; `None` where it passes by.
+pub(super) fn soft_light_along(light: &Light, origin: DVec3, direction: DVec3) -> Option<(DVec3, f64)> {
+    let extent = f64::from(light.extent);
+    if !is_punctual(light) || extent <= 0.0 {
+        return None;
+    }
+    let off_axis = 0.5 * (direction + rgb(light.direction)).length_squared();
+    let intensity = rgb(light.intensity);
+    if light.kind == DIRECTIONAL_LIGHT {
+        return (off_axis <= extent).then(|| (intensity / (2.0 * PI * extent), super::FAR));
+    }
+    let to_middle = rgb(light.position) - origin;
+    let way = to_middle.dot(direction);
+    if way <= 0.0 || (to_middle - way * direction).length_squared() > extent * extent {
+        return None;
+    }
+    let falloff = if light.kind == SPOT_LIGHT {
+        spot_falloff(light, off_axis)
+    } else {
+        1.0
+    };
+    let shown = falloff * range_window(light.inverse_range.into(), way);
+    Some((intensity * (shown / (PI * extent * extent)), way))
 }
 
 #[cfg(test)]

@@ -38,6 +38,13 @@ pub(super) fn cosine_direction(n: DVec3, u: f64, v: f64) -> DVec3 {
     (basis(n) * p.extend((1.0 - p.length_squared()).max(0.0).sqrt())).normalize()
 }
 
+/// A direction uniform in a cone around an axis, with 1 − cos of the angle between its sides and the axis.
+pub(super) fn direction_in_cone(axis: DVec3, versine: f64, u: DVec2) -> DVec3 {
+    let p = disc_point(u.x, u.y);
+    let off = p.length_squared() * versine;
+    (basis(axis) * (p * (versine * (2.0 - off)).max(0.0).sqrt()).extend(1.0 - off)).normalize()
+}
+
 /// Barycentric coordinates (of the second and the third corner) of a point uniform on a triangle.
 pub(super) fn triangle_point(u: f64, v: f64) -> (f64, f64) {
     let s = u.sqrt();

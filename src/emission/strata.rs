@@ -90,6 +90,15 @@ fn is_distant(light: &Light) -> bool {
     [DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT].contains(&light.kind)
 }
 
+/// How far from a light's point its paths may start.
+pub(super) fn extent_of(light: &Light) -> f64 {
+    if [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) {
+        light.extent.into()
+    } else {
+        0.0
+    }
+}
+
 /// Points of a light, which has some place.
 fn points_of(scene: &PackedScene, light: &Light) -> [DVec3; 3] {
     if [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) {
@@ -103,16 +112,17 @@ fn is_met_by_all(scene: &PackedScene, source: &Range<u32>, targets: &Targets, sp
     if sphere.contains(&targets.scene) || *sphere == targets.scene {
         return true;
     }
-    let inside = |point: DVec3| {
+    let inside = |light: &Light, point: DVec3| {
         let point = Sphere {
             centre: point,
             // Paths leave surfaces by a little.
-            radius: 1e-4 * sphere.radius,
+            radius: extent_of(light) + 1e-4 * sphere.radius,
         };
         sphere.contains(&point)
     };
+    let all_inside = |light: &Light| points_of(scene, light).into_iter().all(|point| inside(light, point));
     let mut lights = lights_of(scene, source).iter();
-    lights.all(|light| !is_distant(light) && points_of(scene, light).into_iter().all(inside))
+    lights.all(|light| !is_distant(light) && all_inside(light))
 }
 
 /// About the share of a source's paths, by its own density, that a density uniform among those towards a sphere has.
@@ -120,12 +130,19 @@ fn share(scene: &PackedScene, source: &Range<u32>, sphere: &Sphere) -> f64 {
     let lights = lights_of(scene, source);
     let probes = lights.iter().step_by(lights.len().div_ceil(PROBES));
     let count = probes.len() as f64;
+    let versine = |light: &Light, point: DVec3| {
+        let wider = Sphere {
+            radius: sphere.radius + extent_of(light),
+            ..*sphere
+        };
+        wider.versine(point)
+    };
     let shares = probes.map(|light| match light.kind {
         DIRECTIONAL_LIGHT | ENVIRONMENT_LIGHT => PI * sphere.radius.powi(2) / f64::from(light.area),
-        POINT_LIGHT => sphere.versine(points_of(scene, light)[0]) / 2.0,
+        POINT_LIGHT => versine(light, points_of(scene, light)[0]) / 2.0,
         SPOT_LIGHT => {
             let (inner, outer) = (f64::from(light.inner), f64::from(light.outer));
-            sphere.versine(points_of(scene, light)[0]) / (inner + (outer - inner) / 3.0)
+            versine(light, points_of(scene, light)[0]) / (inner + (outer - inner) / 3.0)
         }
         _ => 2.0 * sphere.versine(points_of(scene, light).into_iter().sum::<DVec3>() / 3.0),
     });

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
 
+use super::strata::extent_of;
 use crate::config::MOST_TARGETS;
 use crate::layout::{
     FOLLOWED_ALPHA, Light, Material, NO_OBJECT, POINT_LIGHT, SPOT_LIGHT, ShadingTriangle, VisiblePoint,
@@ -58,7 +59,7 @@ pub(super) fn targets(scene: &PackedScene, points: &[VisiblePoint]) -> Targets {
     spheres.extend(nested(points, &whole).into_iter().map(target(false)));
     let is_outside = |light: &Light| {
         let position = Vec3::from_array(light.position).as_dvec3();
-        [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) && position.length() > whole.radius
+        [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) && position.length() + extent_of(light) > whole.radius
     };
     if scene.lights.iter().any(is_outside) {
         // Most of what such a light emits meets nothing.

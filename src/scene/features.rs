@@ -66,6 +66,8 @@ features! {
     coincidence: "COINCIDENCE",
     /// Lights that are points or directions.
     punctual: "PUNCTUAL_LIGHTS",
+    /// Some of those with an extent.
+    soft: "SOFT_LIGHTS",
     /// An environment.
     environment: "ENVIRONMENT",
     /// Textures, or colours of corners.
@@ -112,6 +114,7 @@ impl SceneFeatures {
         }
         for light in lights {
             features.punctual |= [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&light.kind);
+            features.soft |= light.extent > 0.0;
             features.environment |= light.kind == ENVIRONMENT_LIGHT;
         }
         features

@@ -113,9 +113,18 @@ fn emissive_triangles(scene: &Scene, order: &[u32]) -> (Vec<Candidate>, Vec<Rang
 
 /// A light, and its power.
 fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
+    // What comes along each direction, so that across the middle one all together is the irradiance.
+    let spread = match light.emission {
+        Emission::Directional { .. } => (0.5 * light.extent).cos().powi(2),
+        Emission::Point | Emission::Spot { .. } => 1.0,
+    };
     let common = Light {
-        intensity: light.intensity.to_array(),
+        intensity: (light.intensity.as_dvec3() / spread).as_vec3().to_array(),
         position: light.position.to_array(),
+        extent: match light.emission {
+            Emission::Directional { .. } => 2.0 * (0.5 * light.extent).sin().powi(2),
+            Emission::Point | Emission::Spot { .. } => light.extent,
+        } as f32,
         inverse_range: light.range.map_or(0.0, |range| (1.0 / range) as f32),
         ..Light::zeroed()
     };
@@ -137,7 +146,12 @@ fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
             ..common
         },
         Emission::Directional { direction } => {
-            let (centre, area) = disc_across(scene, direction.as_dvec3());
+            let (centre, area) = if light.extent > 0.0 {
+                // Rays of many directions come in through a sphere around the scene, as an environment's do.
+                (DVec3::ZERO, PI * bounding_radius(scene).powi(2))
+            } else {
+                disc_across(scene, direction.as_dvec3())
+            };
             disc_area = area;
             Light {
                 kind: DIRECTIONAL_LIGHT,

@@ -33,6 +33,10 @@ pub struct LoadOptions {
     pub light_units: LightUnits,
     /// Whether glass without a volume is solid where its mesh is closed, instead of a thin wall.
     pub solid_glass: bool,
+    /// The angle that directional lights take up, in degrees, 0 ..= 180; 0: their rays are parallel.
+    pub sun_angle: f64,
+    /// Radius of points and spots, in scene units; 0: they have no extent.
+    pub light_radius: f64,
 }
 
 impl Scene {

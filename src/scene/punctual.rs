@@ -36,7 +36,7 @@ pub enum Emission {
     },
 }
 
-/// A light without extent, in render space.
+/// A light that is no surface, in render space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PunctualLight {
     /// How it shines.
@@ -45,6 +45,9 @@ pub struct PunctualLight {
     pub position: Vec3,
     /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB. Never black.
     pub intensity: Vec3,
+    /// How large it is: the radius of a point or spot, in render units, which is seen as a ball of it; half of the angle that a
+    /// directional one takes up, in radians. 0 where it has no extent.
+    pub extent: f64,
     /// Point, spot: the distance that it reaches, in render units; `None` where it reaches any.
     pub range: Option<f64>,
 }
@@ -201,6 +204,11 @@ fn place(
         emission,
         position,
         intensity,
+        extent: if is_directional {
+            0.5 * options.sun_angle.to_radians()
+        } else {
+            options.light_radius * normalisation.scale
+        },
         range: range.filter(|_| !is_directional),
     })
 }

@@ -16,12 +16,20 @@ use ppm_vk::stage::BufferId;
 
 /// What the names of scenes end in that have a light of every kind more than their file.
 const LIT: &str = ", lit";
+/// The same where lights have an extent.
+const SOFTLY_LIT: &str = ", softly lit";
 
-/// A scene of `scenes/`; with lights of every kind if the name ends in [`LIT`].
+/// A scene of `scenes/`; with lights of every kind if the name ends in [`LIT`] or [`SOFTLY_LIT`].
 pub fn scene(name: &str) -> Scene {
     if let Some(name) = name.strip_suffix(LIT) {
         let mut scene = scene(name);
         add_lights(&mut scene);
+        return scene;
+    }
+    if let Some(name) = name.strip_suffix(SOFTLY_LIT) {
+        let mut scene = scene(name);
+        add_lights(&mut scene);
+        scene.lights.iter_mut().for_each(|light| light.extent = 0.1);
         return scene;
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -37,6 +45,7 @@ fn add_lights(scene: &mut Scene) {
         emission,
         position,
         intensity: Vec3::new(1.0, 0.8, 0.5),
+        extent: 0.0,
         range,
     };
     let direction = Vec3::new(0.2, -1.0, -0.7).normalize();

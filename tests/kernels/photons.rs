@@ -150,7 +150,12 @@ fn photons_among_instances_land_where_the_cpus_do() {
 
 #[test]
 fn photons_of_every_kind_of_light_land_where_the_cpus_do() {
-    for name in ["cornell-spheres, lit", "ring, lit", "glasses, lit"] {
+    for name in [
+        "cornell-spheres, lit",
+        "ring, lit",
+        "glasses, lit",
+        "glasses, softly lit",
+    ] {
         // Many of the environment's meet nothing, or what isn't seen.
         assert_photons_agree(name, photons_carry_all_light(), 1e-4, 0.99, 900);
     }

@@ -104,6 +104,8 @@ fn camera_paths_end_where_the_cpus_end() {
         "instances",
         "ring, lit",
         "glasses, lit",
+        "cornell-spheres, softly lit",
+        "glasses, softly lit",
     ] {
         assert_camera_agrees(name, small(), 3000);
     }
@@ -253,6 +255,7 @@ fn direct_light_agrees_at_the_same_visible_points() {
         ("instances", 2000),
         ("ring, lit", 2000),
         ("glossy, lit", 1000),
+        ("glossy, softly lit", 1000),
     ] {
         let mut bench = Bench::new(name, small());
         // Light that grazes a surface has a cosine of which rounding is a larger part.

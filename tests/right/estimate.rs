@@ -130,6 +130,7 @@ fn ground(half_side: f64, has_block: bool, shining: Shining) -> Subject {
             emission: Emission::Directional { direction: Vec3::NEG_Y },
             position: Vec3::ZERO,
             intensity: Vec3::splat(std::f32::consts::PI),
+            extent: 0.0,
             range: None,
         }];
         subject.scene.environment = None;

@@ -17,11 +17,11 @@ use crate::mesh::Mesh;
 use crate::picture::Subject;
 use crate::stage::{camera_ray, mean_on_floor, subject, subject_under, walls};
 
-const ALBEDO: f64 = 0.5;
-const BLACK: [f64; 3] = [0.0; 3];
+pub const ALBEDO: f64 = 0.5;
+pub const BLACK: [f64; 3] = [0.0; 3];
 
 /// A floor under a punctual light that is placed by `place`.
-fn floor_under(light: Value, height: f64, turn: f64) -> Subject {
+pub fn floor_under(light: Value, height: f64, turn: f64) -> Subject {
     let mut scene = Document::new("punctual");
     let grey = scene.material(matte("grey", [ALBEDO; 3]));
     scene.object("floor", &Mesh::facing_up(1.5, 0.0), grey);
@@ -34,7 +34,7 @@ fn floor_under(light: Value, height: f64, turn: f64) -> Subject {
 }
 
 /// By both ways of direct light: the middle, places around it, and most of the picture.
-fn assert_lit(scene: &Subject, radius: f64, irradiance: impl Fn(DVec3) -> f64) {
+pub fn assert_lit(scene: &Subject, radius: f64, irradiance: impl Fn(DVec3) -> f64) {
     let points = [[24, 24], [8, 30], [38, 40], [14, 14], [40, 20]].map(|centre| Region::around(centre, 4));
     let regions = [&points[..], &[Region::around([24, 24], 20)]].concat();
     for (direct, photons) in [(Direct::Light, 100), (Direct::Photons, 50_000)] {
@@ -45,7 +45,7 @@ fn assert_lit(scene: &Subject, radius: f64, irradiance: impl Fn(DVec3) -> f64) {
 }
 
 /// Of an intensity of 1 at a height, with the cosine at the floor.
-fn of_a_point(point: DVec3, height: f64) -> f64 {
+pub fn of_a_point(point: DVec3, height: f64) -> f64 {
     height / (height * height + point.length_squared()).powf(1.5)
 }
 

@@ -40,13 +40,14 @@ fn photons_of_a_spot_are_spread_as_its_intensity() {
 }
 
 /// A room with a lamp, mirrors and glass, and lights of every other kind.
-fn lit_room(far_light: bool) -> PackedScene {
+fn lit_room(far_light: bool, extent: f64) -> PackedScene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-spheres.gltf");
     let mut scene = Scene::load(&path).expect("a scene");
     let light = |emission, position| PunctualLight {
         emission,
         position,
         intensity: Vec3::new(1.0, 0.8, 0.5),
+        extent,
         range: None,
     };
     let direction = Vec3::new(0.2, -1.0, -0.7).normalize();
@@ -96,9 +97,11 @@ fn light_of_start(scene: &PackedScene, start: &Emission) -> usize {
         return others.len();
     }
     let is_of = |light: &&Light| match light.kind {
-        DIRECTIONAL_LIGHT => start.ray.direction == rgb(light.direction),
+        DIRECTIONAL_LIGHT if light.extent == 0.0 => start.ray.direction == rgb(light.direction),
+        DIRECTIONAL_LIGHT => 1.0 - start.ray.direction.dot(rgb(light.direction)) <= f64::from(light.extent),
         ENVIRONMENT_LIGHT => true,
-        _ => start.ray.origin == rgb(light.position),
+        // Of two that overlap the first: a start tells.
+        _ => start.ray.origin.distance(rgb(light.position)) <= f64::from(light.extent) * (1.0 + 1e-9),
     };
     others.iter().position(is_of).expect("a light")
 }
@@ -178,8 +181,8 @@ fn mislead(aim: &mut Aim, scene: &PackedScene, region: Sphere) {
 
 #[test]
 fn aimed_paths_bring_each_lights_flux_whatever_the_table() {
-    for far_light in [false, true] {
-        let scene = lit_room(far_light);
+    for (far_light, extent) in [(false, 0.0), (true, 0.0), (false, 0.1), (true, 0.1)] {
+        let scene = lit_room(far_light, extent);
         let kinds = 1 + scene.lights.iter().filter(|light| light.kind != 0).count();
         let region = |x, y, z, radius| Sphere {
             centre: DVec3::new(x, y, z),
@@ -202,7 +205,7 @@ fn aimed_paths_bring_each_lights_flux_whatever_the_table() {
                 for (light, (found, expected)) in found.iter().zip(&expected).enumerate() {
                     let error = found.error.hypot(expected.error);
                     println!(
-                        "far light {far_light}, {region:?}, misled {misled}, light {light}: {found:?}, by power {expected:?}, \
+                        "far light {far_light}, extent {extent}, {region:?}, misled {misled}, light {light}: {found:?}, by power {expected:?}, \
                          {:.2} standard errors",
                         (found.mean - expected.mean) / error
                     );
@@ -225,7 +228,7 @@ fn aimed_paths_bring_each_lights_flux_whatever_the_table() {
 #[test]
 fn guided_photons_carry_as_much_as_those_that_are_not() {
     const COUNT: u32 = 200_000;
-    let scene = lit_room(false);
+    let scene = lit_room(false, 0.0);
     let config = RenderConfig::default();
     let normal = DVec3::Y;
     for (distance, side) in [(3.0, 0.2), (3.0, 2.0), (2.0, 2.9)] {
