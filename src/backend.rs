@@ -63,9 +63,10 @@ pub trait Backend {
 pub struct Resolved {
     /// The picture.
     pub image: Image,
-    /// Of each pixel, its photons' flux weighed with 1 − 2 distance²/R², as radiance; infinite where no photon has come yet to a
-    /// surface that isn't in the open, which is all that the estimate reads of it.
-    pub curvature: Vec<f32>,
+    /// Of each pixel, the share of the camera paths that met a surface.
+    pub alpha: Vec<f32>,
+    /// Whether no photon has come yet to a pixel's surface, which isn't in the open.
+    pub waits: Vec<bool>,
     /// Of each pixel, what tells whether it has its part of the light behind glass.
     pub behind_glass: Vec<BehindGlass>,
     /// RGB and curvature of each pixel by the iterations of each of [`SEQUENCES`] alone: one picture after another.
@@ -73,8 +74,8 @@ pub struct Resolved {
 }
 
 impl Resolved {
-    /// From a renderer's films, in rows from the top left: RGB and curvature, what tells of light behind glass, and the
-    /// sequences' pictures.
+    /// From a renderer's films, in rows from the top left: RGB and alpha, negative where a pixel waits; what tells of light behind
+    /// glass, and the sequences' pictures.
     pub fn from_film(
         resolution: [u32; 2],
         film: &[[f32; 4]],
@@ -83,7 +84,8 @@ impl Resolved {
     ) -> Self {
         Self {
             image: Image::from_film(resolution, film),
-            curvature: film.iter().map(|pixel| pixel[3]).collect(),
+            alpha: film.iter().map(|pixel| pixel[3].abs()).collect(),
+            waits: film.iter().map(|pixel| pixel[3] < 0.0).collect(),
             behind_glass,
             sequences,
         }

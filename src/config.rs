@@ -254,3 +254,32 @@ impl RenderConfig {
         ((iteration - self.block_of(iteration)) / SEQUENCES).wrapping_mul(self.photons)
     }
 }
+
+/// How much has been rendered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Totals {
+    /// Iterations.
+    pub iterations: u32,
+    /// Photon paths that were emitted in all of them.
+    pub emitted: u64,
+    /// Camera paths of each pixel in all of them.
+    pub camera_paths: u32,
+}
+
+impl Totals {
+    /// Adds what another part of a render has rendered.
+    pub fn add(&mut self, other: Self) {
+        self.iterations += other.iterations;
+        self.emitted += other.emitted;
+        self.camera_paths += other.camera_paths;
+    }
+
+    /// What a picture is divided by, also where nothing has been rendered.
+    pub fn at_least_one(self) -> Self {
+        Self {
+            iterations: self.iterations.max(1),
+            emitted: self.emitted.max(1),
+            camera_paths: self.camera_paths.max(1),
+        }
+    }
+}

@@ -134,7 +134,7 @@ impl ErrorEstimate {
             return None;
         }
         let weights = Weights::of(iterations);
-        let (width, pixels) = (picture.image.width(), picture.curvature.len());
+        let (width, pixels) = (picture.image.width(), picture.waits.len());
         let spread_of = |pixel: usize, channel: usize| {
             let of_sequence = |sequence: usize| f64::from(picture.sequences[sequence * pixels + pixel][channel]);
             Spread::of(weights, std::array::from_fn(of_sequence))
@@ -146,7 +146,7 @@ impl ErrorEstimate {
         let photon = self.photon.radiance / f64::from(iterations);
         let of_pixel = |pixel: usize| {
             let curvature = spread_of(pixel, 3);
-            let without_photons = picture.curvature[pixel].is_infinite();
+            let without_photons = picture.waits[pixel];
             let photon2 = if without_photons { photon.powi(2) } else { 0.0 };
             // Without the pixel itself.
             let mean_around = |channel: usize, value: f64| {

@@ -8,7 +8,7 @@ mod png;
 
 pub use crate::files::{check_writable, write_whole};
 pub use hdr::{hdr_pixels, read_hdr};
-pub use openexr::{exr_pixels, read_exr, write_exr};
+pub use openexr::{Layers, exr_pixels, read_exr, write_exr};
 pub use png::{write_png, write_rgb8};
 
 /// A picture of linear RGB radiance with Rec. 709 primaries.

@@ -403,7 +403,8 @@ device_structs! {
     pub struct VisiblePoint: 48 {
         /// xyz: position; w: u32 bits, object or [`NO_OBJECT`].
         pub position_object: [f32; 4],
-        /// rgb: throughput × BRDF, 1/sr; w: u32 bits, octahedral geometric normal on the viewer's side.
+        /// rgb: throughput × BRDF, 1/sr; w: u32 bits, octahedral geometric normal on the viewer's side, or without an object 1
+        /// where the path met a surface.
         pub weight_normal: [f32; 4],
         /// rgb: radiance that the path saw by itself; w: u32 bits, octahedral shading normal on the viewer's side.
         pub emitted_normal: [f32; 4],
@@ -473,8 +474,8 @@ device_structs! {
         pub asked: u32,
         /// Iterations in which a ray from a point without photons met something that may send it some.
         pub surrounded: u32,
-        /// Zero.
-        pub padding: u32,
+        /// Camera paths of the slot that met a surface; of the first photon map's alone.
+        pub met: u32,
     }
 
     /// Of a pixel, what tells whether it has its part of the light behind glass.

@@ -847,7 +847,13 @@ fn values_of_an_environment_that_are_no_radiance_are_counted() {
         seconds: 0.0,
         estimated_error: None,
     };
-    ppm_vk::film::write_exr(&image, None, &folder.path().join("sky.exr"), &metadata).expect("a picture");
+    ppm_vk::film::write_exr(
+        &image,
+        ppm_vk::film::Layers::default(),
+        &folder.path().join("sky.exr"),
+        &metadata,
+    )
+    .expect("a picture");
     let output = small_render(folder.path(), &scene("lights.gltf"), &["--environment", "sky.exr"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let text = stderr(&output);

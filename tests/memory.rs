@@ -9,7 +9,7 @@ mod fixture;
 mod picture;
 
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Estimator, Limits, RenderConfig, Sizes};
+use ppm_vk::config::{Estimator, Limits, RenderConfig, Sizes, Totals};
 use ppm_vk::gpu::best_device;
 use ppm_vk::pipeline::{Memory, Stages};
 use ppm_vk::scene::SceneFeatures;
@@ -128,7 +128,7 @@ fn pictures_of_usual_sizes_fit_what_a_small_device_binds() {
             sizes: &sizes,
             features: SceneFeatures::ALL,
         };
-        for recording in [stages.iteration(0), stages.picture(1, 1)] {
+        for recording in [stages.iteration(0), stages.picture(Totals::default())] {
             for id in recording.buffers() {
                 let bytes = sizes.bytes(id).unwrap_or_default();
                 assert!(

@@ -2,6 +2,8 @@
 
 #[path = "scene/accessors.rs"]
 mod accessors;
+#[path = "scene/allocations.rs"]
+mod allocations;
 #[path = "scene/animation.rs"]
 mod animation;
 #[path = "scene/assets.rs"]

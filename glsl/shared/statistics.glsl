@@ -42,7 +42,7 @@ struct Coverage {
     uint covered;
     uint asked;
     uint surrounded;
-    uint padding;
+    uint met; // of the first photon map: camera paths that met a surface
 };
 
 // Of a pixel, what tells whether it has its part of the light behind glass.

@@ -153,6 +153,7 @@ void main() {
 
     bool alive = inside;
     bool cut = false;
+    bool met_surface = false;
     VisiblePoint visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
     Gloss gloss = Gloss(vec4(0.0), uvec4(0u));
     while (alive) {
@@ -182,6 +183,7 @@ void main() {
                 branch.ignored = surface.triangle;
                 continue;
             }
+            met_surface = true;
             if (emits(material, facing.front)) {
                 vec3 emission = emitted_radiance(material, -dot(branch.direction, facing.geometric_normal));
                 branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * emission;
@@ -308,6 +310,9 @@ void main() {
         }
         if (ended) {
             visible_point.emitted_normal.rgb = branch.emitted;
+            if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
+                visible_point.weight_normal.w = uintBitsToFloat(met_surface ? 1u : 0u);
+            }
             visible_points[pixel_slot * SLOTS + used] = visible_point;
             footprints[pixel_slot * SLOTS + used] = settings.pixel_spread * (parallel ? 1.0 : branch.way);
             if (GLOSSY) {

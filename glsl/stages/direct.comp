@@ -41,6 +41,7 @@ uniform usamplerBuffer GlossOf;
 uniform usamplerBuffer StatisticsOf;
 uniform usamplerBuffer NearLights;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
+layout(std430) buffer CoverageOf { Coverage coverage[]; };
 layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteration's sequence
 
 // A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
@@ -252,10 +253,13 @@ void main() {
         return;
     }
     VisiblePoint visible_point = VISIBLE_POINT(slot);
+    bool has_object = floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
+    bool met = has_object || floatBitsToUint(visible_point.weight_normal.w) != 0u;
+    coverage[slot].met += met ? 1u : 0u;
     vec3 radiance = visible_point.emitted_normal.rgb;
     float unbent = 0.0;
     bool asks = false;
-    if (SAMPLE_LIGHTS && floatBitsToUint(visible_point.position_object.w) != NO_OBJECT) {
+    if (SAMPLE_LIGHTS && has_object) {
         bool behind_glass;
         asks = asks_behind_glass(slot);
         vec3 sampled = sample_direct(visible_point, slot, asks, behind_glass);

@@ -16,13 +16,14 @@ layout(local_size_x = 64) in;
 layout(push_constant) uniform Push {
     uint iterations;
     float emitted; // photon paths of all iterations
+    uint camera_paths; // of a pixel, of all iterations
 } push;
 
 uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
 layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
-layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left
+layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left; w: see below
 layout(std430) writeonly buffer GlassFilm { BehindGlass glass_film[]; }; // likewise
 
 // 64 bits: a carry of the low words is one more high one.
@@ -47,7 +48,8 @@ void main() {
     if (any(greaterThanEqual(pixel, settings.resolution))) {
         return;
     }
-    vec4 radiance = vec4(0.0); // w: as if the photons' curvature were their flux
+    vec3 radiance = vec3(0.0);
+    uint met = 0u;
     bool has_surface = false;
     bool has_photons = false;
     BehindGlass glass = BehindGlass(0.0, 0.0, 0.0, 0.0, 0.0);
@@ -55,9 +57,11 @@ void main() {
         uint slot = pixel_slot * settings.slots_per_pixel + i;
         DirectSum sum = direct_sums[slot];
         // The quotient of flux and emitted photons comes first: both grow without bound, it doesn't.
-        radiance.rgb += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
+        radiance += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
         glass.unbent += unbent_of(sum);
         has_surface = has_surface || coverage[slot].surrounded > 0u;
+        // Slots of a pixel share its paths.
+        met = max(met, coverage[slot].met);
         VisiblePoint visible_point = VISIBLE_POINT(slot);
         bool lies_behind_glass =
             sum.high.w > 0.0 && floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
@@ -69,9 +73,9 @@ void main() {
             has_photons = has_photons || (mine.accepted_low | mine.accepted_high) != 0u;
             if (mine.radius2_high > 0.0) {
                 float area = PI * mine.radius2_high * share_of(coverage[receiver]);
-                vec4 by_photons = (mine.flux_high + mine.flux_low) / push.emitted / area;
+                vec3 by_photons = (mine.flux_high.rgb + mine.flux_low.rgb) / push.emitted / area;
                 radiance += by_photons;
-                glass.arrived += through_glass ? mean_of(by_photons.rgb) : 0.0;
+                glass.arrived += through_glass ? mean_of(by_photons) : 0.0;
             }
             if (lies_behind_glass && through_glass) {
                 // Of several slots, what the one with the most photons has.
@@ -82,14 +86,14 @@ void main() {
             }
         }
     }
-    if (!finite(radiance.rgb) || isnan(radiance.w) || isinf(radiance.w)) {
+    if (!finite(radiance)) {
         atomicAdd(status.non_finite, 1u);
-        radiance = vec4(0.0);
+        radiance = vec3(0.0);
     }
-    if (has_surface && !has_photons) {
-        radiance.w = uintBitsToFloat(0x7f800000u);
-    }
+    // Alpha, the share of the camera paths that met a surface; negative where no photon has come yet to one that isn't in the open.
+    float alpha = float(met) / float(push.camera_paths);
+    alpha = has_surface && !has_photons ? -alpha : alpha;
     uint index = pixel.y * settings.resolution.x + pixel.x;
     glass_film[index] = glass;
-    film[index] = radiance;
+    film[index] = vec4(radiance, alpha);
 }

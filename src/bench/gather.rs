@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::median;
 use super::structure::{Structure, structure};
 use crate::backend::{Backend, DeviceDescription};
-use crate::config::{GROUP, Probe, RenderConfig};
+use crate::config::{GROUP, Probe, RenderConfig, Totals};
 use crate::cpu::{self, Counts, Inputs};
 use crate::emission::Aim;
 use crate::error::{Error, Result};
@@ -258,8 +258,19 @@ impl GatherBench<'_> {
         steps.raytracing_us[1] = median_of(&|| timed_us(|| cpu::camera(&inputs, cpu::CameraTurn::FIRST, &counts)).1);
         steps.photon_tracing_us[1] =
             median_of(&|| timed_us(|| cpu::compact(&cpu::photons(&inputs, batch, &counts).lanes)).1);
-        steps.synthesize_us[1] =
-            median_of(&|| timed_us(|| cpu::resolve(&settings[0], &points, &statistics, &direct, &coverage, 1, 1)).1);
+        steps.synthesize_us[1] = median_of(&|| {
+            timed_us(|| {
+                cpu::resolve(
+                    &settings[0],
+                    &points,
+                    &statistics,
+                    &direct,
+                    &coverage,
+                    Totals::default().at_least_one(),
+                )
+            })
+            .1
+        });
         Ok(())
     }
 }

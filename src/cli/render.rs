@@ -154,7 +154,11 @@ fn write_outputs(
         estimated_error: error.map(|error| error.total),
     };
     let errors = estimate.of_pixels(rendered.iterations, &rendered.picture);
-    let picture = film::write_exr(image, errors.as_ref(), output, &metadata);
+    let layers = film::Layers {
+        alpha: Some(&rendered.picture.alpha),
+        errors: errors.as_ref(),
+    };
+    let picture = film::write_exr(image, layers, output, &metadata);
     if picture.is_ok() {
         say_rendered(output, rendered, subject, error);
     }

@@ -134,7 +134,7 @@ struct Slot {
 /// The visible points of one of an iteration's paths of each pixel.
 pub fn camera(inputs: &Inputs<'_>, turn: CameraTurn, counts: &Counts) -> Seen {
     let slots_per_pixel = inputs.settings.slots_per_pixel as usize;
-    let mut slots = vec![nothing_seen(DVec3::ZERO); pixel_slots(inputs.settings) * slots_per_pixel];
+    let mut slots = vec![nothing_seen(DVec3::ZERO, false); pixel_slots(inputs.settings) * slots_per_pixel];
     slots
         .par_chunks_mut(slots_per_pixel)
         .enumerate()
@@ -151,11 +151,11 @@ pub fn camera(inputs: &Inputs<'_>, turn: CameraTurn, counts: &Counts) -> Seen {
     }
 }
 
-/// A visible point whose path met no matte surface.
-fn nothing_seen(emitted: DVec3) -> Slot {
+/// A visible point whose path met no matte surface, though perhaps another one.
+fn nothing_seen(emitted: DVec3, met_surface: bool) -> Slot {
     let point = VisiblePoint {
         position_object: with_word(DVec3::ZERO, NO_OBJECT),
-        weight_normal: [0.0; 4],
+        weight_normal: with_word(DVec3::ZERO, met_surface.into()),
         emitted_normal: with_word(emitted, 0),
     };
     Slot {
@@ -168,7 +168,7 @@ fn nothing_seen(emitted: DVec3) -> Slot {
 /// The visible point of a path that ends on a surface.
 fn seen(inputs: &Inputs<'_>, branch: &Branch, surface: &Surface, facing: &Facing, reflector: Reflector) -> Slot {
     if reflector.diffuse.max_element() == 0.0 && reflector.alpha == 0.0 {
-        return nothing_seen(branch.emitted);
+        return nothing_seen(branch.emitted, true);
     }
     let glossy = inputs.scene.features.glossy;
     // The Lambertian BRDF is albedo / π.
@@ -229,6 +229,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
         lamps_seen: false,
     }];
     let mut used = 0;
+    let mut met_surface = false;
     while let Some(mut branch) = pending.pop() {
         let slot = loop {
             let culls = branch.depth == 0;
@@ -242,7 +243,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                     let sky = Environment::of(&inputs.scene.environment).at(branch.ray.direction);
                     branch.emitted += branch.throughput * sky.radiance;
                 }
-                break nothing_seen(branch.emitted);
+                break nothing_seen(branch.emitted, met_surface);
             };
             let incoming = branch.ray.direction;
             let met = Encounter::new(inputs, hit, incoming, branch.media, &random);
@@ -256,6 +257,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                 branch.ignored = Some(surface.triangle);
                 continue;
             }
+            met_surface = true;
             let base_color = rgb(surface.material.base_color);
             if emits(&surface.material, facing.front) {
                 let emission = emitted_radiance(&surface.material, -incoming.dot(facing.geometric_normal));
@@ -287,7 +289,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
             }
             if branch.depth + 1 >= settings.max_depth {
                 counts.add_truncated(1);
-                break nothing_seen(branch.emitted);
+                break nothing_seen(branch.emitted, met_surface);
             }
             branch.depth += 1;
             branch.ignored = Some(surface.triangle);
@@ -322,7 +324,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                     branch = reflected;
                     branch.throughput /= p;
                     if branch.throughput.max_element() <= 0.0 {
-                        break nothing_seen(branch.emitted);
+                        break nothing_seen(branch.emitted, met_surface);
                     }
                     continue;
                 } else {
@@ -396,7 +398,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                 }
             };
             if branch.throughput.max_element() <= 0.0 {
-                break nothing_seen(branch.emitted);
+                break nothing_seen(branch.emitted, met_surface);
             }
             branch.ray.origin = surface.origin_towards(branch.ray.direction);
         };

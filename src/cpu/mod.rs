@@ -48,7 +48,7 @@ pub use intersect::{Hit, PlacedTriangle, Ray, is_blocked, nearest_hit};
 pub use photons::{Batch, Traced, compact, photons};
 pub use primitives::{scan, sort};
 pub use renderer::Renderer;
-pub use resolve::{resolve, resolve_sequences};
+pub use resolve::{count_met, resolve, resolve_sequences};
 pub use sampling::{decode_direction, encode_direction};
 pub use tiles::pixel_of;
 pub use update::{GatheredWith, fit_radius, radii, reset, update};

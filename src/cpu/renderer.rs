@@ -5,11 +5,12 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::{
-    Batch, Counts, Demand, GatheredWith, Inputs, Progress, Seen, camera, compact, coverage, demand, direct, fit_radius,
-    gather_kd_tree, gather_naive, grid_shape, photons, radii, reset, resolve, resolve_sequences, shell_radii, update,
+    Batch, Counts, Demand, GatheredWith, Inputs, Progress, Seen, camera, compact, count_met, coverage, demand, direct,
+    fit_radius, gather_kd_tree, gather_naive, grid_shape, photons, radii, reset, resolve, resolve_sequences,
+    shell_radii, update,
 };
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, demand_floor2, settings};
-use crate::config::{EmissionChoice, Estimator, Limits, RenderConfig, SEQUENCES, Sizes};
+use crate::config::{EmissionChoice, Estimator, Limits, RenderConfig, SEQUENCES, Sizes, Totals};
 use crate::emission::{Aim, is_learned_from};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
@@ -41,8 +42,7 @@ pub struct Renderer {
     /// Median of the initial radii.
     radius: f32,
     photon_flux: Option<f64>,
-    iterations: u32,
-    emitted: u64,
+    totals: Totals,
     counters: Counters,
     /// Of photon paths, if they are aimed.
     aim: Option<Aim>,
@@ -93,8 +93,7 @@ impl Renderer {
             coverage: vec![Coverage::zeroed(); receivers],
             radius: 0.0,
             photon_flux: None,
-            iterations: 0,
-            emitted: 0,
+            totals: Totals::default(),
             counters: Counters::default(),
             aim: None,
             made: Instant::now(),
@@ -208,8 +207,8 @@ impl Renderer {
             statistics: &self.statistics,
             coverage: &self.coverage,
             direct_sums: &self.direct_sums,
-            iterations: self.iterations,
-            emitted: self.emitted,
+            iterations: self.totals.iterations,
+            emitted: self.totals.emitted,
         };
         Some(demand(&self.settings, seen, radii2, progress, grid))
     }
@@ -217,7 +216,7 @@ impl Renderer {
 
 impl Backend for Renderer {
     fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
-        let iteration = self.iterations;
+        let iteration = self.totals.iterations;
         if self.aim.is_some() && self.config.begins_sequences(iteration) {
             if iteration > 0 {
                 self.settings.demand_floor2 = demand_floor2(&self.resolve()?);
@@ -285,6 +284,7 @@ impl Backend for Renderer {
         clock.time("direct", || {
             let (statistics, sums) = (&self.statistics, &mut self.direct_sums);
             direct(&inputs, turn, &self.seen, statistics, &counts, sums, sequence);
+            count_met(&self.seen.points, &mut self.coverage);
         });
         if self.config.estimator == Estimator::Sppm {
             let points = &self.seen.points;
@@ -320,6 +320,7 @@ impl Backend for Renderer {
             clock.time("direct", || {
                 let (statistics, sums) = (&self.statistics, &mut self.direct_sums);
                 direct(&inputs, turn, &self.seen, statistics, &counts, sums, sequence);
+                count_met(&self.seen.points, &mut self.coverage);
             });
         }
         if let Some(aim) = &mut self.aim
@@ -331,25 +332,27 @@ impl Backend for Renderer {
         self.counters.truncated_paths += counts.truncated_paths();
         self.counters.non_finite += counts.non_finite();
         self.counters.photons_landed += counts.landed();
-        self.iterations += 1;
-        self.emitted += u64::from(emitted);
+        self.totals.add(Totals {
+            iterations: 1,
+            emitted: emitted.into(),
+            camera_paths: turn.paths,
+        });
         Ok(Some(clock.run))
     }
 
     fn resolve_all(&mut self) -> Result<Resolved> {
         self.counters.photons_accepted = self.statistics.iter().map(Statistics::accepted).sum();
-        let (iterations, emitted) = (self.iterations.max(1), self.emitted.max(1));
+        let totals = self.totals.at_least_one();
         let (film, behind_glass, non_finite) = resolve(
             &self.settings,
             &self.seen.points,
             &self.statistics,
             &self.direct_sums,
             &self.coverage,
-            iterations,
-            emitted,
+            totals,
         );
         self.counters.non_finite += non_finite;
-        let sequences = resolve_sequences(&self.settings, &self.sequence_sums, iterations);
+        let sequences = resolve_sequences(&self.settings, &self.sequence_sums, totals.iterations);
         Ok(Resolved::from_film(
             self.config.resolution,
             &film,
@@ -359,11 +362,11 @@ impl Backend for Renderer {
     }
 
     fn iterations(&self) -> u32 {
-        self.iterations
+        self.totals.iterations
     }
 
     fn emitted(&self) -> u64 {
-        self.emitted
+        self.totals.emitted
     }
 
     fn counters(&self) -> Counters {

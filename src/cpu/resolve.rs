@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 use bytemuck::Zeroable;
-use glam::{DVec3, DVec4, Vec4};
+use glam::{DVec3, DVec4, Vec3};
 
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{from_two_float, from_two_floats, word, xyz};
-use crate::config::{SEQUENCES, iterations_of};
+use crate::config::{SEQUENCES, Totals, iterations_of};
 use crate::layout::{BehindGlass, Coverage, DirectSum, NO_OBJECT, Settings, Statistics, VisiblePoint};
 
 /// The part of the discs that can have photons; 1 where nothing is known of it.
@@ -62,18 +62,25 @@ fn pixel_width(settings: &Settings, position: DVec3) -> f64 {
     f64::from(settings.pixel_spread) * distance
 }
 
-/// The picture, RGB and curvature (infinite where no photon has come to a surface that isn't in the open), row by row from
-/// the top left: eq. 4 for each slot of a pixel and photon map, and the mean over the iterations of what was seen directly.
-/// What tells how much light behind glass no photon has brought yet. The number of pixels whose radiance isn't finite, and which
-/// are black. `emitted` are the photon paths of all iterations.
+/// Counts the camera paths that met a surface, one of each pixel's.
+pub fn count_met(points: &[VisiblePoint], coverage: &mut [Coverage]) {
+    for (point, coverage) in points.iter().zip(coverage) {
+        let met = word(point.position_object) != NO_OBJECT || word(point.weight_normal) != 0;
+        coverage.met += u32::from(met);
+    }
+}
+
+/// The picture, RGB and alpha, the share of the camera paths that met a surface (negative where no photon has come to one that
+/// isn't in the open), row by row from the top left: eq. 4 for each slot of a pixel and photon map, and the mean over the
+/// iterations of what was seen directly. What tells how much light behind glass no photon has brought yet. The number of pixels
+/// whose radiance isn't finite, and which are black.
 pub fn resolve(
     settings: &Settings,
     points: &[VisiblePoint],
     statistics: &[Statistics],
     direct_sums: &[DirectSum],
     coverage: &[Coverage],
-    iterations: u32,
-    emitted: u64,
+    totals: Totals,
 ) -> (Vec<[f32; 4]>, Vec<BehindGlass>, u64) {
     let [width, height] = settings.resolution.map(|side| side as usize);
     let slots_per_pixel = settings.slots_per_pixel as usize;
@@ -84,15 +91,18 @@ pub fn resolve(
         let Some([x, y]) = pixel_of(settings.resolution, pixel_slot as u32) else {
             continue;
         };
-        let mut radiance = DVec4::ZERO;
+        let mut radiance = DVec3::ZERO;
+        let mut met = 0;
         let (mut unbent, mut arrived) = (0.0, 0.0);
         let mut glass = BehindGlass::zeroed();
         let (mut has_surface, mut has_photons) = (false, false);
         for slot in pixel_slot * slots_per_pixel..(pixel_slot + 1) * slots_per_pixel {
             let direct = &direct_sums[slot];
             has_surface |= coverage[slot].surrounded > 0;
-            let seen = from_two_floats(direct.high, direct.low) / f64::from(iterations);
-            radiance += seen.truncate().extend(0.0);
+            // Slots of a pixel share its paths.
+            met = met.max(coverage[slot].met);
+            let seen = from_two_floats(direct.high, direct.low) / f64::from(totals.iterations);
+            radiance += seen.truncate();
             let unbent_here = if direct.low[3] > 0.0 {
                 f64::from(direct.high[3]) / f64::from(direct.low[3])
             } else {
@@ -107,10 +117,11 @@ pub fn resolve(
                 let radius2 = from_two_float(statistics.radius2_high, statistics.radius2_low);
                 let tau = from_two_floats(statistics.flux_high, statistics.flux_low);
                 if radius2 > 0.0 {
-                    let by_photons = tau / (PI * radius2 * share_of(&coverage[receiver]) * emitted as f64);
+                    let by_photons =
+                        tau.truncate() / (PI * radius2 * share_of(&coverage[receiver]) * totals.emitted as f64);
                     radiance += by_photons;
                     if through_glass == Some(receiver) {
-                        arrived += by_photons.truncate().element_sum() / 3.0;
+                        arrived += by_photons.element_sum() / 3.0;
                     }
                 }
                 let is_seen = word(points[slot].position_object) != NO_OBJECT;
@@ -124,16 +135,15 @@ pub fn resolve(
             }
         }
         (glass.unbent, glass.arrived) = (unbent as f32, arrived as f32);
-        let mut radiance = radiance.as_vec4();
+        let mut radiance = radiance.as_vec3();
         if !radiance.is_finite() {
             non_finite += 1;
-            radiance = Vec4::ZERO;
+            radiance = Vec3::ZERO;
         }
-        if has_surface && !has_photons {
-            radiance.w = f32::INFINITY;
-        }
+        let alpha = (f64::from(met) / f64::from(totals.camera_paths)) as f32;
+        let alpha = if has_surface && !has_photons { -alpha } else { alpha };
         let pixel = y as usize * width + x as usize;
-        film[pixel] = radiance.to_array();
+        film[pixel] = radiance.extend(alpha).to_array();
         glass_film[pixel] = glass;
     }
     (film, glass_film, non_finite)
@@ -161,8 +171,7 @@ mod tests {
             &statistics,
             &vec![DirectSum::zeroed(); slots],
             &vec![Coverage::zeroed(); slots],
-            1,
-            1,
+            Totals::default().at_least_one(),
         );
         assert_eq!((film[0], non_finite), ([0.0; 4], 1));
         assert!(film[1][0] > 1e29, "{:?}", film[1]);

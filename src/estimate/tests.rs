@@ -12,7 +12,8 @@ fn random(index: u32, seed: u32) -> f64 {
     f64::from(crate::cpu::pcg4d([index, seed, 7, 11])[0]) / 4_294_967_296.0
 }
 
-/// A picture after so many iterations, each of which gives pixels what `of_iteration` says: RGB and curvature.
+/// A picture after so many iterations, each of which gives pixels what `of_iteration` says: RGB and curvature, infinite where
+/// the pixel waits for a photon.
 fn picture(resolution: [u32; 2], iterations: u32, mut of_iteration: impl FnMut(u32) -> Vec<[f64; 4]>) -> Resolved {
     let pixels = (resolution[0] * resolution[1]) as usize;
     let mut sums = vec![[0.0; 4]; SEQUENCES as usize * pixels];
@@ -32,6 +33,8 @@ fn picture(resolution: [u32; 2], iterations: u32, mut of_iteration: impl FnMut(u
                 (whole / f64::from(iterations)) as f32
             })
         })
+        // Where no photon has come.
+        .map(|[r, g, b, curvature]: [f32; 4]| [r, g, b, if curvature.is_infinite() { -1.0 } else { 1.0 }])
         .collect();
     let mean = |(index, sum): (usize, &[f64; 4])| sum.map(|sum| (sum / counts[index / pixels].max(1.0)) as f32);
     let sequences = sums.iter().enumerate().map(mean).collect();

@@ -1,6 +1,7 @@
 //! Running an iteration: batch by batch, and again where something didn't fit.
 
 use super::{Renderer, Stages};
+use crate::config::Totals;
 use crate::error::{Error, Result};
 use crate::layout::{GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, StatusCounters};
 use crate::random::CameraTurn;
@@ -80,14 +81,14 @@ impl Renderer {
     }
 
     /// Runs an iteration, each batch of photons by itself: a device that is given minutes of work at once is taken for dead,
-    /// and nothing could stop it. Returns the last status, and the photon paths that count: none where the iteration was cut
-    /// short and is left out.
+    /// and nothing could stop it. Returns the last status, and what counts: nothing where the iteration was cut short and is left
+    /// out.
     pub(super) fn batches(
         &mut self,
         iteration: u32,
         stop: &dyn Fn() -> bool,
         all: &mut Run,
-    ) -> Result<(StatusCounters, u32)> {
+    ) -> Result<(StatusCounters, Totals)> {
         let photons = self.config.photons;
         let batches = self.sizes.batches(photons);
         let mut turn = CameraTurn::that_gathers(&self.config, iteration);
@@ -102,11 +103,11 @@ impl Renderer {
             recording = Recording::new();
             let status = self.status()?;
             if status.again != 0 {
-                return Ok((status, 0));
+                return Ok((status, Totals::default()));
             }
             if stop() {
                 if iteration > 0 {
-                    return Ok((status, 0));
+                    return Ok((status, Totals::default()));
                 }
                 paths = (batch + 1) * self.sizes.batch_paths;
                 // More camera paths could take longer than what was cut.
@@ -116,6 +117,11 @@ impl Renderer {
         }
         self.stages().end(turn, paths, &mut recording);
         all.add(self.run(&recording)?);
-        Ok((self.status()?, paths))
+        let added = Totals {
+            iterations: 1,
+            emitted: paths.into(),
+            camera_paths: turn.paths,
+        };
+        Ok((self.status()?, added))
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::stages::Stages;
-use crate::config::{Limits, RenderConfig, Sizes};
+use crate::config::{Limits, RenderConfig, Sizes, Totals};
 use crate::gpu::DeviceSummary;
 use crate::layout::Settings;
 use crate::scene::PackedScene;
@@ -30,7 +30,7 @@ impl Memory {
             sizes: &sizes,
             features: scene.features,
         };
-        let recordings = [stages.shortest_iteration(), stages.picture(1, 1)];
+        let recordings = [stages.shortest_iteration(), stages.picture(Totals::default())];
         let buffers: BTreeSet<_> = recordings.iter().flat_map(|recording| recording.buffers()).collect();
         let render: u64 = buffers.iter().filter_map(|&id| sizes.bytes(id)).sum();
         let of_maps = [

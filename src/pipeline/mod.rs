@@ -11,7 +11,7 @@ use memory::{bindable_bytes, limits, scene_buffers};
 pub use stages::Stages;
 
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
-use crate::config::{Accel, Limits, Probe, RenderConfig, Sizes};
+use crate::config::{Accel, Limits, Probe, RenderConfig, Sizes, Totals};
 use crate::emission::{Aim, is_learned_from};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, default_method, grid_sizes};
@@ -34,8 +34,7 @@ pub struct Renderer {
     /// Median of the initial radii.
     radius: f32,
     photon_flux: Option<f64>,
-    iterations: u32,
-    emitted: u64,
+    totals: Totals,
     counters: Counters,
     /// Photons that a lane needs room for at the most, and a batch.
     photon_need: [u32; 2],
@@ -106,8 +105,7 @@ impl Renderer {
             },
             radius: 0.0,
             photon_flux: None,
-            iterations: 0,
-            emitted: 0,
+            totals: Totals::default(),
             counters: Counters::default(),
             photon_need: [0, 0],
             fitted: false,
@@ -117,7 +115,7 @@ impl Renderer {
         renderer.upload_settings()?;
         // Before any work: memory that lacks is told now and not after an hour.
         let stages = renderer.stages();
-        let (iteration, picture) = (stages.shortest_iteration(), stages.picture(1, 1));
+        let (iteration, picture) = (stages.shortest_iteration(), stages.picture(Totals::default()));
         renderer.make_buffers(&iteration)?;
         renderer.make_buffers(&picture)?;
         renderer.prepare(scene)?;
@@ -164,7 +162,7 @@ impl Renderer {
     /// # Errors
     /// As [`Backend::resolve`].
     pub fn picture(&mut self) -> Result<(Run, Resolved)> {
-        let recording = self.stages().picture(self.iterations.max(1), self.emitted.max(1));
+        let recording = self.stages().picture(self.totals);
         let run = self.run(&recording)?;
         let status = self.status()?;
         self.counters.non_finite += u64::from(status.non_finite);
@@ -254,16 +252,16 @@ impl Renderer {
 impl Backend for Renderer {
     fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
         self.fit_photon_buffers()?;
-        let iteration = self.iterations;
+        let iteration = self.totals.iterations;
         self.begin_block(iteration)?;
-        let mut emitted = 0;
+        let mut added = Totals::default();
         let (run, status) = self.do_until_it_fits(|renderer, all| {
-            let (status, paths) = renderer.batches(iteration, stop, all)?;
-            emitted = paths;
+            let (status, of_batches) = renderer.batches(iteration, stop, all)?;
+            added = of_batches;
             Ok(status)
         })?;
         let counters = &mut self.counters;
-        if emitted == 0 {
+        if added.emitted == 0 {
             return self.forget_gathered().map(|()| None);
         }
         counters.photons_stored += status.photons_stored();
@@ -276,8 +274,7 @@ impl Backend for Renderer {
         if is_learned_from(&self.config, iteration) {
             self.learn(iteration, self.sizes.batch_paths)?;
         }
-        self.iterations += 1;
-        self.emitted += u64::from(emitted);
+        self.totals.add(added);
         Ok(Some(run))
     }
 
@@ -286,11 +283,11 @@ impl Backend for Renderer {
     }
 
     fn iterations(&self) -> u32 {
-        self.iterations
+        self.totals.iterations
     }
 
     fn emitted(&self) -> u64 {
-        self.emitted
+        self.totals.emitted
     }
 
     fn counters(&self) -> Counters {

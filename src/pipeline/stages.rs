@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::config::{Accel, Direct, Estimator, RenderConfig, SEQUENCES, Sizes, TriangleTest, iterations_of};
+use crate::config::{Accel, Direct, Estimator, RenderConfig, SEQUENCES, Sizes, Totals, TriangleTest, iterations_of};
 use crate::gather::{METHODS, Record, default_method, grid_sizes, scan};
 use crate::random::CameraTurn;
 use crate::record::Recording;
@@ -105,17 +105,23 @@ impl Stages<'_> {
         }
     }
 
-    /// The commands that make the picture, after so many iterations and photon paths.
-    pub fn film(&self, iterations: u32, emitted: u64) -> Recording {
+    /// The commands that make the picture of what was rendered.
+    pub fn film(&self, totals: Totals) -> Recording {
         let mut recording = reporting();
-        let push = [iterations, (emitted as f32).to_bits()];
+        let Totals {
+            iterations,
+            emitted,
+            camera_paths,
+        } = totals.at_least_one();
+        let push = [iterations, (emitted as f32).to_bits(), camera_paths];
         recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
         recording
     }
 
     /// The same, and the pictures of the sequences.
-    pub fn picture(&self, iterations: u32, emitted: u64) -> Recording {
-        let mut recording = self.film(iterations, emitted);
+    pub fn picture(&self, totals: Totals) -> Recording {
+        let mut recording = self.film(totals);
+        let iterations = totals.at_least_one().iterations;
         for (sequence, (sums, film)) in (0..).zip(SEQUENCE_SUMS.into_iter().zip(SEQUENCE_FILMS)) {
             recording.dispatch(
                 StageDesc::new(&shaders::RESOLVE_SEQUENCE, self.sizes.pixel_slots)

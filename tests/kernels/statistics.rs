@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Estimator, RenderConfig};
+use ppm_vk::config::{Estimator, RenderConfig, Totals};
 use ppm_vk::cpu::{self, Counts, GatheredWith};
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{
@@ -328,24 +328,22 @@ fn pictures_are_resolved_by_equation_4() {
                 covered: (16.0 * b) as u32,
                 asked: 16,
                 surrounded: u32::from(c < 0.5),
-                padding: 0,
+                met: (12.0 * c) as u32,
             });
         }
         bench.upload(BufferId::StatisticsOf, &statistics);
         bench.upload(BufferId::DirectSums, &direct_sums);
         bench.upload(BufferId::CoverageOf, &coverage);
-        let (iterations, emitted) = (bench.renderer.iterations(), bench.renderer.emitted());
+        let iterations = bench.renderer.iterations();
+        let totals = Totals {
+            iterations,
+            emitted: bench.renderer.emitted(),
+            camera_paths: iterations * bench.config.camera_paths(),
+        };
         let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
         let resolved = bench.renderer.resolve_all().expect("a picture");
-        let (expected, behind_glass, _) = cpu::resolve(
-            &bench.settings,
-            &points,
-            &statistics,
-            &direct_sums,
-            &coverage,
-            iterations,
-            emitted,
-        );
+        let (expected, behind_glass, _) =
+            cpu::resolve(&bench.settings, &points, &statistics, &direct_sums, &coverage, totals);
         for (pixel, (found, expected)) in resolved.image.pixels().iter().zip(&expected).enumerate() {
             for channel in 0..3 {
                 let difference = relative_difference(found[channel].into(), expected[channel].into());
@@ -354,8 +352,14 @@ fn pictures_are_resolved_by_equation_4() {
                     "{estimator:?}, pixel {pixel}: {found:?} on the device, {expected:?} on the CPU"
                 );
             }
-            let waits = resolved.curvature[pixel].is_infinite();
-            assert_eq!(waits, expected[3].is_infinite(), "{estimator:?}, pixel {pixel}: waits");
+            let (waits, alpha) = (resolved.waits[pixel], f64::from(resolved.alpha[pixel]));
+            assert_eq!(waits, expected[3] < 0.0, "{estimator:?}, pixel {pixel}: waits");
+            let difference = relative_difference(alpha, expected[3].abs().into());
+            assert!(
+                difference < TOLERANCE,
+                "{estimator:?}, pixel {pixel}: alpha {alpha}, not {}",
+                expected[3]
+            );
         }
         for (pixel, (found, expected)) in resolved.behind_glass.iter().zip(&behind_glass).enumerate() {
             let values =

@@ -1,7 +1,7 @@
 //! Equations 2 and 3 over very many iterations and photons, and at the ends of α's range.
 
 use bytemuck::Zeroable;
-use ppm_vk::config::RenderConfig;
+use ppm_vk::config::{RenderConfig, Totals};
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
 use ppm_vk::gather::METHODS;
@@ -217,7 +217,11 @@ fn pictures_stay_right_when_more_than_two_to_the_32_photons_were_emitted() {
             sizes: bench.renderer.sizes(),
             features: SceneFeatures::ALL,
         };
-        let recording = stages.picture(iterations, emitted);
+        let recording = stages.picture(Totals {
+            iterations,
+            emitted,
+            camera_paths: iterations,
+        });
         bench.renderer.run(&recording).expect("a run");
         let film: Vec<[f32; 4]> = bench.download(BufferId::Film);
         for pixel in Image::from_film([8, 8], &film).pixels() {
