@@ -80,7 +80,7 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
         response *= arriving.irradiance / (of_one ? light.probability : 1.0);
         bool seen = largest(response) > 0.0;
         if (seen) {
-            seen = trace_visible(origin, arriving.ray, arriving.end, NO_TRIANGLE, true, false, random).triangle == MISS;
+            seen = trace_visible(origin, arriving.ray, AT_ORIGIN, arriving.end, NO_TRIANGLE, true, random).triangle == MISS;
         }
         sum += seen ? response : vec3(0.0);
     }

@@ -76,7 +76,7 @@ struct Glimpse {
 };
 
 Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, Media media, bool lamps_seen, Random random) {
-    Hit hit = trace_visible(origin, direction, 1e30, ignored, false, false, random);
+    Hit hit = trace_visible(origin, direction, AT_ORIGIN, 1e30, ignored, false, random);
     if (loops_cut) {
         return Glimpse(vec3(0.0), true);
     }
@@ -154,16 +154,18 @@ void main() {
     bool alive = inside;
     bool cut = false;
     bool met_surface = false;
+    Progress progress = AT_ORIGIN; // past backs that no camera sees
     VisiblePoint visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
     Gloss gloss = Gloss(vec4(0.0), uvec4(0u));
     while (alive) {
         loop_count += 1u;
         bool ended = true;
         visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
-        Hit hit = trace_visible(branch.origin, branch.direction, 1e30, branch.ignored, false, branch.depth == 0u, random);
+        Hit hit = trace_visible(branch.origin, branch.direction, progress, 1e30, branch.ignored, false, random);
         if (SOFT_LIGHTS && !loops_cut && !branch.lamps_seen && !branch.emission_seen) {
-            branch.emitted += branch.throughput *
-                              soft_lights_along(branch.origin, branch.direction, way_of(hit), branch.media.first);
+            vec3 from = branch.origin + progress.t * branch.direction;
+            branch.emitted += branch.throughput * soft_lights_along(from, branch.direction, way_of(hit) - progress.t,
+                                                                    branch.media.first);
         }
         if (loops_cut) {
             cut = true;
@@ -172,6 +174,12 @@ void main() {
             Surface surface = met.surface;
             Material material = met.material;
             Facing facing = met.facing;
+            bool culled = CULLING && branch.depth == 0u && !facing.front && (material.flags & BACK_HIDDEN) != 0u;
+            if (culled) {
+                progress = past(hit);
+                continue;
+            }
+            progress = AT_ORIGIN;
             branch.way += hit.t;
             if (ABSORPTION) {
                 branch.throughput *= transmittance(met.through.first, hit.t);
@@ -323,6 +331,7 @@ void main() {
             if (alive) {
                 pending_count -= 1u;
                 branch = pending[pending_count];
+                progress = AT_ORIGIN;
             }
         }
     }

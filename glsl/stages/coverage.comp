@@ -93,21 +93,23 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
         return false;
     }
     // Then down: it may bend, but it must be there, under glass that lies on it and other faces in its place too.
-    progress = AT_ORIGIN;
-    bool is_there = false;
-    bool goes_on = true;
-    for (uint i = 0u; i < MOST_CROSSINGS && goes_on; i++) {
-        Hit below = trace_from(origin + along, -radius * n, progress, 1.0, NO_TRIANGLE, false);
-        goes_on = below.triangle != MISS && !loops_cut;
-        if (goes_on) {
-            Surface there = surface_at(below);
-            is_there = there.object == object && share_there(there) > 0.0;
-            bool lies_on = COINCIDENCE && (there.flags & (COINCIDENT | BACKED)) != 0u;
-            goes_on = !is_there && (lies_on || (CONTACT && is_dielectric(material_at(there.material))));
-            progress = past(below);
+    vec3 down = -radius * n;
+    Hit below = trace(origin + along, down, 1.0, NO_TRIANGLE, false);
+    if (COINCIDENCE) {
+        for (uint i = 1u; i < MOST_CROSSINGS && below.triangle != MISS && !loops_cut; i++) {
+            Surface met = surface_at(below);
+            bool lies_on = (met.flags & (COINCIDENT | BACKED)) != 0u || is_dielectric(material_at(met.material));
+            if (met.object == object || !lies_on) {
+                break;
+            }
+            below = trace_from(origin + along, down, past(below), 1.0, NO_TRIANGLE, false);
         }
     }
-    return is_there;
+    if (below.triangle == MISS) {
+        return false;
+    }
+    Surface there = surface_at(below);
+    return there.object == object && share_there(there) > 0.0;
 }
 
 // Whether a ray meets something, past glass, that may scatter light or mirror it.

@@ -167,7 +167,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool be
     bool any = !by_bsdf;
     bool goes_on = true;
     while (goes_on) {
-        hit = trace_visible(from, ray, question.end - passed, question.ignored, any, false, random);
+        hit = trace_visible(from, ray, AT_ORIGIN, question.end - passed, question.ignored, any, random);
         goes_on = ASKS_BEHIND_GLASS && asks && hit.triangle != MISS && !loops_cut && crossings < MOST_CROSSINGS;
         if (goes_on) {
             ShadingTriangle triangle = shading_triangle(hit.triangle);

@@ -141,7 +141,7 @@ void main() {
             }
         }
         rays += 1u;
-        Hit hit = trace_visible(path.origin, path.direction, 1e30, path.ignored, false, false, random);
+        Hit hit = trace_visible(path.origin, path.direction, AT_ORIGIN, 1e30, path.ignored, false, random);
         if (loops_cut) {
             break;
         }

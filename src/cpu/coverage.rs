@@ -136,8 +136,8 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, [u, 
             return false;
         };
         let there = surface_of(inputs.scene, hit);
-        if there.object == object && share_there(inputs.scene, &there) > 0.0 {
-            return true;
+        if there.object == object {
+            return share_there(inputs.scene, &there) > 0.0;
         }
         let lies_on = there.flags & (COINCIDENT | BACKED) != 0;
         if !(lies_on || (inputs.scene.features.contact && there.material.surface == DIELECTRIC)) {
