@@ -416,7 +416,7 @@ device_structs! {
         pub diffuse_viewer: [f32; 4],
         /// f16s, two to a word: reflectance of the boundary at normal incidence, linear RGB, and at grazing incidence; GGX's α, 0
         /// where the path followed the reflection itself; how much of a coat there is; the largest channel of what lies over
-        /// the base at both angles.
+        /// the base at both angles. α's sign: whether the material is coated.
         pub rest: [u32; 4],
     }
 
@@ -424,7 +424,8 @@ device_structs! {
     pub struct Photon: 32 {
         /// xyz: position; w: u32 bits, object and [`CAUSTIC`].
         pub position_object: [f32; 4],
-        /// rgb: flux, not divided by the emitted paths; w: u32 bits, octahedral direction of flight.
+        /// rgb: flux, not divided by the emitted paths, and on coated materials over the cosine to the geometric normal; w: u32
+        /// bits, octahedral direction of flight.
         pub flux_direction: [f32; 4],
     }
 

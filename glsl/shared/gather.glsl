@@ -20,10 +20,11 @@ struct Receiver {
     vec3 shading_normal;
     vec3 viewer;
     Reflector reflector;
+    bool coated;
 };
 
 const Receiver NO_RECEIVER = Receiver(vec3(0.0), -1.0, NO_OBJECT, vec3(0.0), vec3(0.0), vec3(0.0),
-                                      NO_REFLECTOR);
+                                      NO_REFLECTOR, false);
 
 // R² of a slot for a photon map.
 float radius2_at(uint slot, uint map) {
@@ -45,6 +46,7 @@ Receiver receiver_at(uint slot, uint map) {
         receiver.shading_normal = decode_direction(floatBitsToUint(TEXEL(VisiblePoints, 3u * slot + 2u).w));
         receiver.viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
         receiver.reflector = reflector_of(gloss);
+        receiver.coated = is_coated(gloss);
     }
     return receiver;
 }
@@ -81,7 +83,10 @@ void gather(Receiver receiver, Photon photon, inout Sum sum) {
     if (GLOSSY) {
         // What is summed up is what the surface scatters to the viewer. A photon that is no match may have no direction.
         vec3 l = -decode_direction(floatBitsToUint(photon.flux_direction.w));
-        flux *= accepted ? brdf(receiver.reflector, receiver.shading_normal, receiver.viewer, l) : vec3(0.0);
+        vec3 n = receiver.shading_normal;
+        // Photons on coated objects have it across their rays, since each layer has a normal of its own.
+        float cosine = receiver.coated ? max(dot(n, l), 0.0) : 1.0;
+        flux *= accepted ? cosine * brdf(receiver.reflector, n, receiver.viewer, l) : vec3(0.0);
     }
     sum.flux += accepted ? flux : vec3(0.0);
     sum.count += accepted ? 1u : 0u;

@@ -31,14 +31,22 @@ struct Gloss {
 Reflector reflector_of(Gloss gloss) {
     vec2 f0_b_f90 = unpackHalf2x16(gloss.rest.y);
     vec2 alpha_coat = unpackHalf2x16(gloss.rest.z);
-    return Reflector(gloss.diffuse_viewer.rgb, vec3(unpackHalf2x16(gloss.rest.x), f0_b_f90.x), f0_b_f90.y, alpha_coat.x,
-                     unpackHalf2x16(gloss.rest.w), alpha_coat.y);
+    return Reflector(gloss.diffuse_viewer.rgb, vec3(unpackHalf2x16(gloss.rest.x), f0_b_f90.x), f0_b_f90.y,
+                     abs(alpha_coat.x), unpackHalf2x16(gloss.rest.w), alpha_coat.y);
 }
 
-Gloss gloss_of(Reflector reflector, vec3 v) {
+// α's sign: whether the material is coated.
+const uint COATED = 0x8000u;
+
+bool is_coated(Gloss gloss) {
+    return (gloss.rest.z & COATED) != 0u;
+}
+
+Gloss gloss_of(Reflector reflector, vec3 v, bool coated) {
     return Gloss(vec4(reflector.diffuse, uintBitsToFloat(encode_direction(v))),
                  uvec4(packHalf2x16(reflector.f0.rg), packHalf2x16(vec2(reflector.f0.b, reflector.f90)),
-                       packHalf2x16(vec2(reflector.alpha, reflector.coat)), packHalf2x16(reflector.over_base)));
+                       packHalf2x16(vec2(reflector.alpha, reflector.coat)) | (coated ? COATED : 0u),
+                       packHalf2x16(reflector.over_base)));
 }
 
 // The fifth power of 1 − cosine.

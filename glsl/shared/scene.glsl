@@ -223,6 +223,15 @@ bool is_coated(Material material) {
     return CLEARCOAT && material.coat > 0.0;
 }
 
+// Whether a material has a coat anywhere: photons on it have their flux across their rays.
+bool has_coat(uint material) {
+    bool has = false;
+    if (CLEARCOAT) {
+        has = TEXEL(Materials, MATERIAL_TEXELS * material + 8u).x > 0.0;
+    }
+    return has;
+}
+
 bool is_glossy(Material material) {
     return GLOSSY && material.surface == GLOSSY_SURFACE;
 }

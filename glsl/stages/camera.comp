@@ -304,7 +304,7 @@ void main() {
             if (stops && (largest(reflector.diffuse) > 0.0 || reflector.alpha > 0.0)) {
                 vec3 weight = branch.throughput;
                 if (GLOSSY) {
-                    gloss = gloss_of(reflector, viewer);
+                    gloss = gloss_of(reflector, viewer, has_coat(surface.material));
                 } else {
                     weight *= reflector.diffuse / PI;
                 }

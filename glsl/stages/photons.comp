@@ -194,9 +194,14 @@ void main() {
                     if (stored < settings.lane_capacity) {
                         Photon photon;
                         photon.position_object = vec4(surface.position, uintBitsToFloat(surface.object | map << 31u));
+                        vec3 flux_there = landing;
+                        if (has_coat(surface.material)) {
+                            // Across the ray: a coat has another shading normal than what lies below it.
+                            flux_there = path.flux / -dot(incoming, facing.geometric_normal);
+                        }
                         // What is there in part is seen in part as well as met in part.
-                        photon.flux_direction = vec4(landing / met.share,
-                                                     uintBitsToFloat(encode_direction(incoming)));
+                        photon.flux_direction =
+                            vec4(flux_there / met.share, uintBitsToFloat(encode_direction(incoming)));
                         lane_photons[stored * settings.photon_lanes + lane] = photon;
                     }
                     stored += 1u;

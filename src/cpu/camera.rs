@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::boundary::Boundary;
-use super::contact::{Encounter, choose_part, is_mixed};
+use super::contact::{Encounter, choose_part, has_coat, is_mixed};
 use super::dispersion::disperse;
 use super::environment::Environment;
 use super::glint::{glint, soft_lights_along};
@@ -117,6 +117,11 @@ impl<'a> From<&'a Vec<VisiblePoint>> for SeenSlice<'a> {
 }
 
 impl SeenSlice<'_> {
+    /// Whether a slot's material is coated.
+    pub(super) fn is_coated(&self, slot: usize) -> bool {
+        self.gloss.get(slot).is_some_and(Reflector::is_coated)
+    }
+
     /// How a slot's surface scatters and the direction to the viewer, in a scene with glossy surfaces.
     pub(super) fn reflector(&self, slot: usize) -> Option<(Reflector, DVec3)> {
         self.gloss.get(slot).map(Reflector::from_gloss)
@@ -180,7 +185,7 @@ fn seen(inputs: &Inputs<'_>, branch: &Branch, surface: &Surface, facing: &Facing
     };
     Slot {
         point,
-        gloss: reflector.to_gloss(-branch.ray.direction),
+        gloss: reflector.to_gloss(-branch.ray.direction, has_coat(inputs, surface)),
         footprint: 0.0,
     }
 }

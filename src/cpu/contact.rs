@@ -218,6 +218,11 @@ impl Encounter {
     }
 }
 
+/// Whether a surface's material has a coat anywhere: photons on it have their flux across their rays.
+pub(super) fn has_coat(inputs: &Inputs<'_>, surface: &Surface) -> bool {
+    inputs.scene.materials[surface.material_index as usize].coat > 0.0
+}
+
 /// What part of a surface passes light; 1 for what is no dielectric at all.
 fn clear_part(material: &Material) -> f64 {
     if material.surface == DIELECTRIC {

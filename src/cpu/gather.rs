@@ -49,6 +49,7 @@ struct Receiver {
     shading_normal: DVec3,
     /// Of a scene with glossy surfaces; and the direction to the viewer.
     reflector: Option<(Reflector, DVec3)>,
+    coated: bool,
 }
 
 fn position(position_object: [f32; 4]) -> [f32; 3] {
@@ -57,7 +58,7 @@ fn position(position_object: [f32; 4]) -> [f32; 3] {
 
 impl Receiver {
     /// `None` where the path met no matte surface.
-    fn new(point: &VisiblePoint, map: usize, radius2: f32, reflector: Option<(Reflector, DVec3)>) -> Option<Self> {
+    fn new(point: &VisiblePoint, map: usize, radius2: f32, seen: SeenSlice<'_>, slot: usize) -> Option<Self> {
         let object = word(point.position_object);
         (object != NO_OBJECT).then(|| Self {
             position: position(point.position_object),
@@ -65,7 +66,8 @@ impl Receiver {
             object: if map == 1 { object | CAUSTIC } else { object },
             normal: decode_direction(word(point.weight_normal)),
             shading_normal: decode_direction(word(point.emitted_normal)),
-            reflector,
+            reflector: seen.reflector(slot),
+            coated: seen.is_coated(slot),
         })
     }
 
@@ -78,10 +80,13 @@ impl Receiver {
         let direction = decode_direction(word(photon.flux_direction));
         if distance2 <= self.radius2 && word(photon.position_object) == self.object && direction.dot(self.normal) < 0.0
         {
-            let brdf = self.reflector.map_or(DVec3::ONE, |(reflector, viewer)| {
-                reflector.brdf(self.shading_normal, viewer, -direction)
+            let response = self.reflector.map_or(DVec3::ONE, |(reflector, viewer)| {
+                // Photons on coated objects have their flux across their rays, since each layer has a normal of its own.
+                let cosine = -direction.dot(self.shading_normal);
+                let cosine = if self.coated { cosine.max(0.0) } else { 1.0 };
+                reflector.brdf(self.shading_normal, viewer, -direction) * cosine
             });
-            sum.add(xyz(photon.flux_direction) * brdf, distance2);
+            sum.add(xyz(photon.flux_direction) * response, distance2);
         }
     }
 }
@@ -97,7 +102,7 @@ fn for_each_receiver(
     let receivers = gathered.par_iter_mut().zip(radii2).enumerate();
     receivers.for_each(|(index, (gathered, &radius2))| {
         let (map, slot) = (index / seen.points.len(), index % seen.points.len());
-        if let Some(receiver) = Receiver::new(&seen.points[slot], map, radius2, seen.reflector(slot)) {
+        if let Some(receiver) = Receiver::new(&seen.points[slot], map, radius2, seen, slot) {
             let mut sum = Sum::default();
             gather(&receiver, &mut sum);
             sum.add_to(gathered);

@@ -34,6 +34,7 @@ pub struct Reflector {
 }
 
 /// Reflectance of a clear coat, whose index of refraction is 1.5, at normal incidence.
+const COATED: u32 = 0x8000; // of Gloss::rest
 pub(super) const COAT_F0: f64 = 0.04;
 
 /// What a coat lets through to what lies below.
@@ -79,6 +80,11 @@ impl Reflector {
     }
 
     /// What a visible point keeps, and the direction to the viewer.
+    /// Whether the material of a visible point is coated: α's sign.
+    pub(super) fn is_coated(gloss: &Gloss) -> bool {
+        gloss.rest[2] & COATED != 0
+    }
+
     pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
         let [f0_rg, f0_b_f90, alpha_coat, over_base] = gloss.rest.map(|word| [half(word), half(word >> 16)]);
@@ -87,13 +93,13 @@ impl Reflector {
             f0: DVec3::new(f0_rg[0], f0_rg[1], f0_b_f90[0]),
             f90: f0_b_f90[1],
             over_base,
-            alpha: alpha_coat[0],
+            alpha: alpha_coat[0].abs(),
             coat: alpha_coat[1],
         };
         (reflector, decode_direction(word(gloss.diffuse_viewer)))
     }
 
-    pub(super) fn to_gloss(self, v: DVec3) -> Gloss {
+    pub(super) fn to_gloss(self, v: DVec3, coated: bool) -> Gloss {
         let halves = |[low, high]: [f64; 2]| {
             let half = |value: f64| u32::from(f16::from_f64(value).to_bits());
             half(low) | half(high) << 16
@@ -104,9 +110,11 @@ impl Reflector {
             [self.alpha, self.coat],
             self.over_base,
         ];
+        let mut rest = rest.map(halves);
+        rest[2] |= if coated { COATED } else { 0 };
         Gloss {
             diffuse_viewer: with_word(self.diffuse, encode_direction(v)),
-            rest: rest.map(halves),
+            rest,
         }
     }
 

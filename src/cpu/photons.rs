@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::boundary::Boundary;
-use super::contact::{Encounter, choose_part};
+use super::contact::{Encounter, choose_part, has_coat};
 use super::dispersion::disperse;
 use super::emission::{emit, guide};
 use super::gloss::Reflector;
@@ -161,10 +161,13 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
                 if wanted > 0.0 {
                     let worth = f64::from(wanted) * mean(landing).powi(2);
                     value.value = (f64::from(value.value) + worth).min(1e37) as f32;
+                    // Across the ray: a coat has another shading normal than what lies below it.
+                    let across = path.flux / -incoming.dot(facing.geometric_normal);
+                    let flux = if has_coat(inputs, &surface) { across } else { landing };
                     photons.push(Photon {
                         position_object: with_word(surface.position, surface.object | map_bit),
                         // What is there in part is seen in part as well as met in part.
-                        flux_direction: with_word(landing / met.share, encode_direction(incoming)),
+                        flux_direction: with_word(flux / met.share, encode_direction(incoming)),
                     });
                 }
             }

@@ -25,6 +25,11 @@ fn coated(material: Value, factor: f64, roughness: f64) -> Value {
     with_extension(material, "KHR_materials_clearcoat", extension)
 }
 
+/// A component of a normal in a texture.
+fn normal_byte(part: f64) -> u8 {
+    (127.5 + 127.5 * part).round() as u8
+}
+
 /// Schlick's curve of a dielectric of index 1.5.
 fn schlick(cosine: f64) -> f64 {
     0.04 + 0.96 * (1.0 - cosine).powi(5)
@@ -152,8 +157,7 @@ fn a_smooth_coat_reflects_by_schlicks_curve_of_index_1_5() {
 fn a_coat_has_normals_of_its_own() {
     let lean = 30_f64.to_radians();
     let leaning = |scene: &mut Document| {
-        let value = |part: f64| (127.5 + 127.5 * part).round() as u8;
-        let texel = [value(lean.sin()), value(0.0), value(lean.cos()), 255];
+        let texel = [normal_byte(lean.sin()), normal_byte(0.0), normal_byte(lean.cos()), 255];
         let normals = scene.texture(&png(1, 1, |_, _| texel), Filter::Nearest);
         let slot = "/extensions/KHR_materials_clearcoat/clearcoatNormalTexture";
         let nothing = json!({"specularFactor": 0});
@@ -163,6 +167,33 @@ fn a_coat_has_normals_of_its_own() {
     // Of bytes, the angle is right to 0.3°.
     let expected = |cosine: f64| schlick(lean.cos() * cosine);
     assert_plate_shows(leaning, Direct::Light, 100, "a leaning coat", expected, 1e-2);
+}
+
+/// The normals of the black base lean by 45°, those of the rough coat don't. Photons and rays bring it the same light.
+#[test]
+fn the_normals_of_the_base_change_nothing_of_a_rough_coat() {
+    let coat = Reflector {
+        diffuse: DVec3::ZERO,
+        f0: DVec3::splat(0.04),
+        f90: 1.0,
+        over_base: [0.0; 2],
+        alpha: 0.36,
+        coat: 0.0,
+    };
+    for direct in [Direct::Light, Direct::Photons] {
+        for lean in [0.0, 45_f64.to_radians()] {
+            let leaning = |scene: &mut Document| {
+                let texel = [normal_byte(lean.sin()), normal_byte(0.0), normal_byte(lean.cos()), 255];
+                let normals = scene.texture(&png(1, 1, |_, _| texel), Filter::Nearest);
+                let nothing = json!({"specularFactor": 0});
+                let black = with_extension(matte("black", [0.0; 3]), "KHR_materials_specular", nothing);
+                with_texture(coated(black, 1.0, 0.6), "/normalTexture", normals)
+            };
+            let what = format!("a coat over normals that lean by {lean} rad");
+            let expected = |cosine| whole_albedo(coat, cosine);
+            assert_plate_shows(leaning, direct, 20_000, &what, expected, 1e-3);
+        }
+    }
 }
 
 /// A thin wall sees radiance 1 on both sides: coat and wall together lose nothing.
