@@ -277,5 +277,9 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         pixel_spread: 2.0 * half_height / height as f32,
         demand_floor2: 1.0,
         near_light_count: scene.near_lights.len() as u32,
+        light_source_count: scene.light_sources.len() as u32,
+        padding0: 0,
+        padding1: 0,
+        padding2: 0,
     }
 }

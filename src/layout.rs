@@ -125,7 +125,7 @@ macro_rules! device_structs {
 
 device_structs! {
     /// What stays the same through a render. Lengths in render units.
-    pub struct Settings: 160 {
+    pub struct Settings: 176 {
         /// xyz: centre of projection; w: radius of the lens.
         pub camera_position: [f32; 4],
         /// xyz: to the picture's right edge, at distance 1; w: distance along the direction of view of what is in focus.
@@ -177,6 +177,14 @@ device_structs! {
         pub demand_floor2: f32,
         /// Spheres in which a light is near.
         pub near_light_count: u32,
+        /// [`LightSource`]s.
+        pub light_source_count: u32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+        /// Zero.
+        pub padding2: u32,
     }
 
     /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf, or one of the two of an
@@ -372,6 +380,35 @@ device_structs! {
         pub direction: [f32; 3],
         /// Point, spot: 1 over the distance that it reaches, 0 where it reaches any.
         pub inverse_range: f32,
+    }
+
+    /// What a source of light can bring at the most: its lights' bounds in place and direction.
+    pub struct LightSource: 64 {
+        /// Triangles, points: centre of a sphere around them.
+        pub centre: [f32; 3],
+        /// Its radius.
+        pub radius: f32,
+        /// Unit vector that they shine along; 0 where that is to all sides.
+        pub axis: [f32; 3],
+        /// Cosine of the angle that a triangle's normal or a spot's edge leans from it at the most, or of half the angle that a sun is
+        /// seen at.
+        pub cos_cone: f32,
+        /// Triangles, points: intensity along the normal or axis. Others: irradiance.
+        pub strength: f32,
+        /// As of its lights, where all have one.
+        pub inverse_range: f32,
+        /// As of its lights.
+        pub kind: u32,
+        /// Index of its first light.
+        pub first_light: u32,
+        /// Lights.
+        pub light_count: u32,
+        /// Probability that it is chosen without knowing the point.
+        pub probability: f32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
     }
 
     /// A box of starts of photon paths, and a cell of the alias table that chooses one. A start has five coordinates in [0, 1):

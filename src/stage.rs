@@ -30,6 +30,8 @@ pub enum BufferId {
     Lights,
     /// Spheres in which a light is near, centre and squared radius: see `scene/near_lights.rs`.
     NearLights,
+    /// [`crate::layout::LightSource`]s.
+    LightSources,
     /// What shines from afar, and how directions are chosen from it; see `glsl/shared/environment.glsl`.
     Environment,
     /// Where aimed photon paths start; see [`crate::emission::Table::texels`].

@@ -31,10 +31,6 @@ struct Start {
     float weight; // 1 / density of the coordinates
 };
 
-float cumulative_probability(uint light) {
-    return uintBitsToFloat(TEXEL_BITS(Lights, LIGHT_TEXELS * light + 1u).z);
-}
-
 // In steps of 2⁻²⁴, as random numbers are: tables are looked up with these.
 vec4 in_box(vec4 low, vec4 size, vec4 u) {
     return min(floor((low + size * u) * 16777216.0), 16777215.0) * (1.0 / 16777216.0);
@@ -51,22 +47,8 @@ Start choose_start(EmissionTableSize size, vec4 u, vec4 w) {
     vec4 light_weight = TEXEL(EmissionTable, cell + 2u);
     uvec4 rest = TEXEL_BITS(EmissionTable, cell + 3u);
     float e = in_box(light_weight.xxxx, light_weight.yyyy, w.wwww).x;
-    uint low = rest.y;
-    uint high = rest.y + rest.z - 1u;
-    float before = 0.0;
-    float end = 1.0;
-    while (low < high) {
-        uint middle = (low + high) / 2u;
-        float cumulative = cumulative_probability(middle);
-        if (e < cumulative) {
-            high = middle;
-            end = cumulative;
-        } else {
-            low = middle + 1u;
-            before = cumulative;
-        }
-    }
-    return Start(low, end - before, coordinates.xy, coordinates.zw, rest.w, light_weight.z);
+    LightWithin within = light_within(rest.y, rest.z, e);
+    return Start(within.light, within.probability, coordinates.xy, coordinates.zw, rest.w, light_weight.z);
 }
 
 // Whether a ray meets a sphere. One that comes from afar has no beginning.

@@ -52,6 +52,41 @@ bool is_punctual(uint kind) {
     return kind == POINT_LIGHT || kind == SPOT_LIGHT || kind == DIRECTIONAL_LIGHT;
 }
 
+float cumulative_probability(uint light) {
+    return uintBitsToFloat(TEXEL_BITS(Lights, LIGHT_TEXELS * light + 1u).z);
+}
+
+struct LightWithin {
+    uint light;
+    float probability; // within its source
+};
+
+// Of a source's lights the one that a number chooses, a multiple of 2⁻²⁴ as their cumulative probabilities are.
+LightWithin light_within(uint first, uint count, float e) {
+    uint low = first;
+    uint high = first + count - 1u;
+    float before = 0.0;
+    float end = 1.0;
+    while (low < high) {
+        uint middle = (low + high) / 2u;
+        float cumulative = cumulative_probability(middle);
+        if (e < cumulative) {
+            high = middle;
+            end = cumulative;
+        } else {
+            low = middle + 1u;
+            before = cumulative;
+        }
+    }
+    return LightWithin(low, end - before);
+}
+
+// A light's probability within its source. The last one before those of a source has 1.
+float probability_within(uint light) {
+    float before = light > 0u ? cumulative_probability(light - 1u) : 0.0;
+    return cumulative_probability(light) - (before < 1.0 ? before : 0.0);
+}
+
 Choice choose_light(float u, vec2 digits) {
     AliasPlace place = alias_place(settings.light_count, u, digits);
     vec4 entry = TEXEL(Lights, LIGHT_TEXELS * place.cell + 1u);

@@ -25,4 +25,8 @@ layout(std140) uniform Settings {
     float pixel_spread;         // side of a pixel's footprint at distance 1 along a path, or anywhere where rays are parallel
     float demand_floor2;        // beside the squared radiance where what visible points want of photons is weighed
     uint near_light_count;      // spheres in which a light is near
+    uint light_source_count;    // sources that direct light is chosen from
+    uint padding0;
+    uint padding1;
+    uint padding2;
 } settings;

@@ -21,6 +21,7 @@ layout(local_size_x = 64) in;
 #include "contact.glsl"
 #include "environment.glsl"
 #include "light.glsl"
+#include "light_sources.glsl"
 #include "object_grid.glsl"
 #include "visible_point.glsl"
 #include "two_float.glsl"
@@ -73,14 +74,28 @@ struct Question {
     uint kind;       // of the light
     Surface emitter; // triangle: the light's point
     Sky sky;         // environment
-    vec3 irradiance; // punctual: across the ray, over the light's probability
+    vec3 irradiance; // punctual: across the ray
+    float probability; // of the light
 };
 
-// Towards a light that u.x chooses.
-Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
-    uint chosen = choose_light(u.x, digits).index;
-    Light light = light_at(chosen);
+// Towards a light that u.x chooses, or of that source.
+Question ask_light(vec3 position, vec3 normal, vec3 origin, uint of_source, vec3 u, vec2 digits) {
+    uint chosen;
     Question question;
+    if (FEW_SOURCES) {
+        LightSource source = light_source_at(of_source);
+        LightWithin within = light_within(source.first_light, source.light_count, digits.x);
+        chosen = within.light;
+        question.probability = within.probability;
+    } else if (MANY_SOURCES) {
+        LightChoice choice = choose_light_for(position, normal, u.x, digits.x);
+        chosen = choice.light;
+        question.probability = choice.probability;
+    } else {
+        chosen = choose_light(u.x, digits).index;
+        question.probability = light_at(chosen).probability;
+    }
+    Light light = light_at(chosen);
     question.kind = light.kind;
     question.end = 1e30;
     question.ignored = NO_TRIANGLE;
@@ -88,7 +103,7 @@ Question ask_light(vec3 position, vec3 origin, vec3 u, vec2 digits) {
         Arriving arriving = arriving_from(punctual_light_at(chosen), light.kind, origin, u.yz);
         question.ray = arriving.ray;
         question.end = arriving.end;
-        question.irradiance = arriving.irradiance / light.probability;
+        question.irradiance = arriving.irradiance;
     } else if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
         question.sky = sample_environment(u.yz, question.ray);
     } else {
@@ -114,14 +129,24 @@ bool is_near_light(vec3 position) {
     return near;
 }
 
+// The probability of a light for a ray that met it; 0 of one that isn't of the source that is asked.
+float probability_of_light(vec3 position, vec3 normal, uint of_source, uint light) {
+    if (FEW_SOURCES) {
+        return has_light(light_source_at(of_source), light) ? probability_within(light) : 0.0;
+    }
+    if (MANY_SOURCES) {
+        return probability_for(position, normal, light);
+    }
+    return light_at(light).probability;
+}
+
 // One ray, by chance towards a point of a light or along a direction of the BSDF, with the density of both together
 // (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
 // variance next to a light. No direction of the BSDF meets a punctual light.
 // behind_glass: glass stands before the light, so that this is what it would bring unbent.
-vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool behind_glass) {
+vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool asks, inout Random random,
+                   out bool behind_glass) {
     behind_glass = false;
-    CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
-    Random random = random_of_pixel(LIGHT_SAMPLE, slot, turn, settings.seed);
     vec4 u = next4(random);
     // What chooses among many lights needs more digits.
     vec4 digits = settings.light_count > 1u ? next4(random) : vec4(0.0);
@@ -151,9 +176,12 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool be
             }
         }
     }
+    if (FEW_SOURCES) {
+        bsdf_sampling = is_punctual(light_source_at(of_source).kind) ? 0.0 : bsdf_sampling;
+    }
     bool by_bsdf = u.w < bsdf_sampling;
     if (!by_bsdf) {
-        question = ask_light(position, origin, u.xyz, digits.xz);
+        question = ask_light(position, shading_normal, origin, of_source, u.xyz, digits.xz);
     }
     vec3 ray = question.ray;
     if (dot(ray, geometric_normal) <= 0.0 || dot(ray, shading_normal) <= 0.0) {
@@ -198,14 +226,21 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool be
     vec3 radiance;
     float of_light = 0.0; // density per solid angle
     if (punctual) {
-        radiance = question.irradiance;
+        radiance = question.irradiance / question.probability;
     } else if (ENVIRONMENT && (by_bsdf ? missed : question.kind == ENVIRONMENT_LIGHT)) {
         Sky sky = question.sky;
         if (by_bsdf) {
             sky = environment_at(ray);
         }
         radiance = sky.radiance;
-        of_light = sky.density * light_at(settings.light_count - 1u).probability;
+        float probability = question.probability;
+        if (by_bsdf) {
+            probability = probability_of_light(position, shading_normal, of_source, settings.light_count - 1u);
+        }
+        if (FEW_SOURCES && probability <= 0.0) {
+            return vec3(0.0);
+        }
+        of_light = sky.density * probability;
     } else {
         Surface emitter = question.emitter;
         if (by_bsdf) {
@@ -229,7 +264,14 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, bool asks, out bool be
         // A ray that met the light had its chance to pass it.
         float there = by_bsdf ? 1.0 : share_there(emitter);
         radiance = there * emitted_radiance(material, abs(cos_light));
-        of_light = light.probability * distance2 / (light.area * abs(cos_light));
+        float probability = question.probability;
+        if (by_bsdf) {
+            probability = probability_of_light(position, shading_normal, of_source, emitter.light);
+        }
+        if (FEW_SOURCES && probability <= 0.0) {
+            return vec3(0.0);
+        }
+        of_light = probability * distance2 / (light.area * abs(cos_light));
     }
     float cos_surface = dot(direction, shading_normal);
     if (cos_surface <= 0.0) {
@@ -260,13 +302,21 @@ void main() {
     float unbent = 0.0;
     bool asks = false;
     if (SAMPLE_LIGHTS && has_object) {
-        bool behind_glass;
         asks = asks_behind_glass(slot);
-        vec3 sampled = sample_direct(visible_point, slot, asks, behind_glass);
-        if (behind_glass) {
-            unbent = finite(sampled) ? mean_of(sampled) : 0.0;
-        } else {
-            radiance += sampled;
+        CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
+        Random random = random_of_pixel(LIGHT_SAMPLE, slot, turn, settings.seed);
+        uint questions = 1u;
+        if (FEW_SOURCES) {
+            questions = settings.light_source_count;
+        }
+        for (uint source = 0u; source < questions; source++) {
+            bool behind_glass;
+            vec3 sampled = sample_direct(visible_point, slot, source, asks, random, behind_glass);
+            if (behind_glass) {
+                unbent += finite(sampled) ? mean_of(sampled) : 0.0;
+            } else {
+                radiance += sampled;
+            }
         }
     }
     if (!finite(radiance)) {

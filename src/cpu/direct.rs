@@ -12,6 +12,7 @@ use super::environment::{Environment, Sky};
 use super::gloss::Reflector;
 use super::intersect::{Hit, PlacedTriangle, Ray};
 use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
+use super::light_sources::{self, choose_light_for, choose_light_of, probability_for};
 use super::media::Media;
 use super::resolve::photons_of;
 use super::sampling::{cosine_direction, decode_direction, triangle_point};
@@ -20,7 +21,9 @@ use super::texture::{apply_textures, nearest_visible, share_there};
 use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
-use crate::layout::{DirectSum, ENVIRONMENT_LIGHT, NO_LIGHT, NO_OBJECT, Statistics, VisiblePoint};
+use crate::layout::{
+    DirectSum, ENVIRONMENT_LIGHT, LightSource, NO_LIGHT, NO_OBJECT, Statistics, TRIANGLE_LIGHT, VisiblePoint,
+};
 use crate::random::{CameraTurn, PathKind, Random};
 
 /// Adds the radiance that one of an iteration's paths of each pixel saw to the sum of each slot, and to that of the
@@ -49,23 +52,29 @@ pub fn direct<'a>(
         let mut asks = false;
         if inputs.config.direct == Direct::Light && word(point.position_object) != NO_OBJECT {
             let mut random = Random::of_pixel(inputs.config, PathKind::LightSample, slot as u32, turn);
-            let sample = random.next4();
-            let digits = if inputs.scene.lights.len() > 1 {
-                random.next4()
-            } else {
-                [0.0; 4]
-            };
             asks = inputs.scene.features.dielectric
                 && turn.path == 0
                 && inputs.config.asks_behind_glass(turn.iteration)
                 && (turn.iteration.is_multiple_of(ASKS_EVERY) || photons_of(statistics) < SEASONED);
-            let (sampled, behind_glass) =
-                sample_direct(inputs, point, seen.reflector(slot), sample, digits, asks, &random);
-            if behind_glass {
-                let mean = sampled.element_sum() / 3.0;
-                unbent = if mean.is_finite() { mean } else { 0.0 };
-            } else {
-                radiance += sampled;
+            // Each of few sources, or whichever light is chosen.
+            let few = inputs.scene.features.few_sources;
+            let sources = inputs.scene.light_sources.iter().filter(|_| few).map(Some);
+            for source in sources.chain((!few).then_some(None)) {
+                let sample = random.next4();
+                let digits = if inputs.scene.lights.len() > 1 {
+                    random.next4()
+                } else {
+                    [0.0; 4]
+                };
+                let gloss = seen.reflector(slot);
+                let (sampled, behind_glass) =
+                    sample_direct(inputs, point, gloss, source, [sample, digits], asks, &random);
+                if behind_glass {
+                    let mean = sampled.element_sum() / 3.0;
+                    unbent += if mean.is_finite() { mean } else { 0.0 };
+                } else {
+                    radiance += sampled;
+                }
             }
         }
         radiance /= f64::from(turn.paths);
@@ -149,8 +158,8 @@ fn sample_direct(
     inputs: &Inputs<'_>,
     point: &VisiblePoint,
     gloss: Option<(Reflector, DVec3)>,
-    [choice, u, v, way]: [f64; 4],
-    [first_digits, _, second_digits, _]: [f64; 4],
+    source: Option<&LightSource>,
+    [[choice, u, v, way], [first_digits, _, second_digits, _]]: [[f64; 4]; 2],
     asks: bool,
     random: &Random,
 ) -> (DVec3, bool) {
@@ -172,6 +181,9 @@ fn sample_direct(
         _ if is_near_light(inputs, position) => (f64::from(inputs.settings.bsdf_sampling), 0.0),
         _ => (0.0, 0.0),
     };
+    // No direction of the BSDF meets a punctual light.
+    let meets = source.is_none_or(|source| [TRIANGLE_LIGHT, ENVIRONMENT_LIGHT].contains(&source.kind));
+    let q = if meets { q } else { 0.0 };
     let leaves = |ray: DVec3| ray.dot(geometric_normal) > 0.0 && ray.dot(shading_normal) > 0.0;
     // Where nothing but glass stands in the way, that.
     let look_for = |direction: DVec3, end: f64, ignored: Option<PlacedTriangle>| {
@@ -192,9 +204,20 @@ fn sample_direct(
         }
         response(direction) * radiance / ((1.0 - q) * density + q * of_bsdf)
     };
+    // 0 of one that isn't of the source that is asked.
+    let probability_of = |light: u32| match source {
+        Some(source) => light_sources::probability_of(inputs, source, light),
+        None if inputs.scene.features.many_sources => probability_for(inputs, position, shading_normal, light),
+        None => inputs.scene.lights[light as usize].probability.into(),
+    };
     let sky = |sky: Sky, direction: DVec3| {
-        let probability = inputs.scene.lights.last().map_or(0.0, |light| light.probability);
-        let density = sky.density * f64::from(probability);
+        // The environment is the last light.
+        let last = inputs.scene.lights.len().checked_sub(1);
+        let probability = last.map_or(0.0, |light| probability_of(light as u32));
+        if source.is_some() && probability == 0.0 {
+            return DVec3::ZERO;
+        }
+        let density = sky.density * probability;
         response_to(Sky { density, ..sky }, direction)
     };
     let environment = Environment::of(&inputs.scene.environment);
@@ -217,11 +240,20 @@ fn sample_direct(
         let met = Interface::new(inputs, hit, direction, Media::VACUUM, random);
         (met.surface, seen)
     } else {
-        let light = choose_light(&inputs.scene.lights, choice, [first_digits, second_digits]).light;
+        let (light, probability) = match source {
+            Some(source) => choose_light_of(inputs, source, first_digits),
+            None if inputs.scene.features.many_sources => {
+                choose_light_for(inputs, position, shading_normal, [choice, first_digits])
+            }
+            None => {
+                let light = choose_light(&inputs.scene.lights, choice, [first_digits, second_digits]).light;
+                (light, light.probability.into())
+            }
+        };
         if is_punctual(light) {
             let Arriving { ray, end, irradiance } = arriving_from(light, origin, DVec2::new(u, v));
             return look_for(ray, end, None).map_or(nothing, |seen| {
-                seen.of(response(ray.normalize()) * irradiance / (f64::from(light.probability) * (1.0 - q)))
+                seen.of(response(ray.normalize()) * irradiance / (probability * (1.0 - q)))
             });
         }
         if light.kind == ENVIRONMENT_LIGHT {
@@ -255,6 +287,10 @@ fn sample_direct(
         return nothing;
     }
     let radiance = there * emitted_radiance(&emitter.material, cos_light.abs());
-    let density = f64::from(light.probability) * to_light.length_squared() / (f64::from(light.area) * cos_light.abs());
+    let probability = probability_of(emitter.light);
+    if source.is_some() && probability == 0.0 {
+        return nothing;
+    }
+    let density = probability * to_light.length_squared() / (f64::from(light.area) * cos_light.abs());
     seen_light.of(response_to(Sky { radiance, density }, direction))
 }

@@ -23,6 +23,7 @@ mod glint;
 mod gloss;
 mod intersect;
 mod light;
+mod light_sources;
 mod media;
 mod photons;
 mod primitives;

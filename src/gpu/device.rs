@@ -195,6 +195,7 @@ fn advice(id: BufferId) -> &'static str {
         | BufferId::Corners
         | BufferId::Lights
         | BufferId::NearLights
+        | BufferId::LightSources
         | BufferId::ObjectGrids => "make the scene smaller, or use another --device or --backend cpu",
         _ => "try fewer --photons or a smaller --resolution",
     }

@@ -77,7 +77,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
 }
 
 /// The buffers that hold the scene.
-pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 12] {
+pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 13] {
     [
         (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
         (BufferId::HavelTriangles, bytemuck::cast_slice(&scene.havel_triangles)),
@@ -92,6 +92,7 @@ pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 12] {
         (BufferId::Texels, bytemuck::cast_slice(&scene.texels)),
         (BufferId::Lights, bytemuck::cast_slice(&scene.lights)),
         (BufferId::NearLights, bytemuck::cast_slice(&scene.near_lights)),
+        (BufferId::LightSources, bytemuck::cast_slice(&scene.light_sources)),
         (BufferId::Environment, bytemuck::cast_slice(&scene.environment)),
         (BufferId::ObjectGrids, bytemuck::cast_slice(&scene.object_grids)),
     ]

@@ -82,6 +82,10 @@ features! {
     culling: "CULLING",
     /// Instances that share triangles.
     instanced: "INSTANCED",
+    /// Several sources of light, so few that direct light asks each.
+    few_sources: "FEW_SOURCES",
+    /// So many that one is chosen by what it can bring.
+    many_sources: "MANY_SOURCES",
     /// A lens before the camera that is rendered.
     lens: "LENS",
 }

@@ -31,6 +31,8 @@ struct Candidate {
 pub(super) struct Lights {
     /// Triangles by object and in leaf order, punctual ones, the environment; with the alias table.
     pub lights: Vec<Light>,
+    /// What each emits, mean of RGB.
+    pub powers: Vec<f64>,
     /// Ranges of them.
     pub sources: Vec<Range<u32>>,
     /// What they emit together, mean of RGB.
@@ -65,7 +67,12 @@ pub(super) fn lights(scene: &Scene, order: &[u32]) -> Lights {
         let within = source.start as usize..source.end as usize;
         light_sources::set_cumulative(&mut lights[within.clone()], &powers[within]);
     }
-    Lights { lights, sources, power }
+    Lights {
+        lights,
+        powers,
+        sources,
+        power,
+    }
 }
 
 /// Gives lights the probabilities, whose sum is 1, by which they are to be chosen.

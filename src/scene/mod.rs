@@ -30,6 +30,7 @@ mod instancing;
 mod json;
 mod ktx2;
 mod light;
+mod light_bounds;
 mod light_sources;
 mod light_table;
 mod light_units;

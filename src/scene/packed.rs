@@ -12,13 +12,16 @@ use super::nesting::Nesting;
 use super::object_grid::object_grids;
 use super::{
     Alpha, Dielectric, Environment, Gloss, MaterialTextures, SHARED, Scene, Surface, area, bvh, contact, environment,
-    light_table,
+    light_bounds, light_table,
 };
 use crate::layout::{
-    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, HavelTriangle, Instance, Light, MASK, MIRRORED, Material,
-    NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, RANK, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED, ShadingTriangle,
-    TEXTURED, TRIANGLE_LIGHT, TextureLookup,
+    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, HavelTriangle, Instance, Light, LightSource, MASK, MIRRORED,
+    Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, RANK, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED,
+    ShadingTriangle, TEXTURED, TRIANGLE_LIGHT, TextureLookup,
 };
+
+/// Sources of light of which each is asked by a ray of its own; of more one is chosen.
+const ASKED_ALL: usize = 4;
 
 /// What the ray stages read, in the order of the BVH's leaves.
 #[derive(Debug, Clone)]
@@ -64,6 +67,8 @@ pub struct PackedScene {
     pub bsdf_sampling: f32,
     /// Where lights are near: centre and squared radius of spheres.
     pub near_lights: Vec<[f32; 4]>,
+    /// Bounds of [`PackedScene::sources`].
+    pub light_sources: Vec<LightSource>,
 }
 
 impl PackedScene {
@@ -79,7 +84,7 @@ impl PackedScene {
         } = shared_triangles(scene);
         let bvh = bvh::build(scene, &ranges, &placed)?;
         let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| scene.corners_of(index)).collect();
-        let light_table::Lights { lights, sources, power } = light_table::lights(scene, &bvh.order);
+        let light_table = light_table::lights(scene, &bvh.order);
         let own_triangles = bvh.shared.first().map_or(bvh.order.len() as u32, |shared| shared.start);
         let own = bvh.order[..own_triangles as usize].iter().map(|&index| {
             let object = scene.triangles[index as usize].object;
@@ -98,7 +103,8 @@ impl PackedScene {
             .zip(&corners)
             .map(|((index, material), corners)| shading_triangle(scene, index, material, corners))
             .collect();
-        let emissive = lights
+        let emissive = light_table
+            .lights
             .iter()
             .enumerate()
             .filter(|(_, light)| light.kind == TRIANGLE_LIGHT);
@@ -115,9 +121,11 @@ impl PackedScene {
                 triangle.flags |= nesting.ranks[triangle.object as usize] << RANK;
             }
         }
-        let mut features = SceneFeatures::of(&shading_triangles, &materials, &lights);
+        let mut features = SceneFeatures::of(&shading_triangles, &materials, &light_table.lights);
         features.instanced = !instances.is_empty();
         features.nested = nesting.overlaps;
+        features.few_sources = (2..=ASKED_ALL).contains(&light_table.sources.len());
+        features.many_sources = light_table.sources.len() > ASKED_ALL;
         features.coincidence |= features.contact || contacts.doubled;
         // Where a solid has no thickness, it is a thin wall.
         features.thin_walls |= features.contact && contacts.doubled;
@@ -125,13 +133,18 @@ impl PackedScene {
         texels.resize(texels.len().next_multiple_of(4), 0);
         let (object_grids, object_cells) = object_grids(scene);
         let near_lights = NearLights {
-            lights: &lights,
-            sources: &sources,
+            lights: &light_table.lights,
+            sources: &light_table.sources,
             corners: &corners,
             environment: scene.environment.as_ref(),
         };
+        let two_sided = |triangle: u32| {
+            let material = shading_triangles[triangle as usize].material;
+            materials[material as usize].flags & BACK_EMITS != 0
+        };
+        let light_sources = light_bounds::light_sources(&light_table, &corners, two_sided, scene.environment.as_ref());
         Ok(Self {
-            power,
+            power: light_table.power,
             corners: if features.textured {
                 texture_corners(scene, &bvh.order)
             } else {
@@ -148,9 +161,10 @@ impl PackedScene {
             instances,
             bsdf_sampling: near_lights.bsdf_sampling(area_of_all(scene)),
             near_lights: near_lights.spheres(),
+            light_sources,
             materials,
-            lights,
-            sources,
+            lights: light_table.lights,
+            sources: light_table.sources,
             environment: scene
                 .environment
                 .as_ref()

@@ -1,0 +1,143 @@
+//! Which source of light a point asks: the counterpart of `glsl/shared/light_sources.glsl`.
+
+use glam::DVec3;
+
+use super::Inputs;
+use super::vector::rgb;
+use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, LightSource, TRIANGLE_LIGHT};
+
+/// The part of all choices among those that can bring anything that is made without knowing the point.
+const WITHOUT_POINT: f64 = 0.1;
+
+/// Cosine of the difference of two angles, or 1 where the first is the smaller one.
+fn cos_beyond(cos_a: f64, cos_b: f64) -> f64 {
+    let sines = ((1.0 - cos_a * cos_a).max(0.0) * (1.0 - cos_b * cos_b).max(0.0)).sqrt();
+    if cos_a >= cos_b { 1.0 } else { cos_a * cos_b + sines }
+}
+
+/// Irradiance at the most, up to a factor.
+fn most_from(source: &LightSource, position: DVec3, normal: DVec3) -> f64 {
+    let strength = f64::from(source.strength);
+    let (axis, cos_cone) = (rgb(source.axis), f64::from(source.cos_cone));
+    match source.kind {
+        ENVIRONMENT_LIGHT => return strength,
+        DIRECTIONAL_LIGHT => return strength * cos_beyond(-normal.dot(axis), cos_cone).max(0.0),
+        _ => {}
+    }
+    let to_centre = rgb(source.centre) - position;
+    let distance2 = to_centre.length_squared();
+    let radius2 = f64::from(source.radius).powi(2);
+    if distance2 <= radius2 {
+        return strength / radius2.max(1e-37);
+    }
+    let distance = distance2.max(1e-37).sqrt();
+    // The angle that its sphere is seen at.
+    let cos_width = (1.0 - radius2 / distance2).max(0.0).sqrt();
+    let cos_surface = cos_beyond(normal.dot(to_centre) / distance, cos_width);
+    let cos_light = cos_beyond(cos_beyond(-axis.dot(to_centre) / distance, cos_cone), cos_width);
+    let cos_light = if source.kind == TRIANGLE_LIGHT {
+        cos_light.max(0.0)
+    } else {
+        f64::from(u8::from(cos_light >= 1.0))
+    };
+    if (distance - f64::from(source.radius)) * f64::from(source.inverse_range) < 1.0 {
+        strength * cos_surface.max(0.0) * cos_light / (distance * distance)
+    } else {
+        0.0
+    }
+}
+
+/// Each source with its probability at a point.
+fn sources<'a>(
+    inputs: &Inputs<'a>,
+    position: DVec3,
+    normal: DVec3,
+) -> impl Iterator<Item = (&'a LightSource, f64)> + use<'a> {
+    let of_scene = &inputs.scene.light_sources;
+    let most: Vec<f64> = of_scene
+        .iter()
+        .map(|source| most_from(source, position, normal))
+        .collect();
+    let all: f64 = most.iter().sum();
+    let without_point = |(source, most): (&LightSource, &f64)| if *most > 0.0 { source.probability } else { 0.0 };
+    let without_point: f32 = of_scene.iter().zip(&most).map(without_point).sum();
+    let probability = move |(source, most): (&'a LightSource, f64)| {
+        let own = f64::from(source.probability);
+        let probability = match (all > 0.0, most > 0.0) {
+            // Where none can bring anything, nothing is lost by any choice.
+            (false, _) => own,
+            (true, true) => (1.0 - WITHOUT_POINT) * most / all + WITHOUT_POINT * own / f64::from(without_point),
+            (true, false) => 0.0,
+        };
+        (source, probability)
+    };
+    of_scene.iter().zip(most).map(probability)
+}
+
+/// The lights of a source, and the index of the first one.
+fn lights_of<'a>(inputs: &Inputs<'a>, source: &LightSource) -> (usize, &'a [Light]) {
+    let first = source.first_light as usize;
+    (first, &inputs.scene.lights[first..first + source.light_count as usize])
+}
+
+/// A light's probability within its source.
+fn probability_within(of_source: &[Light], number: usize) -> f64 {
+    let before = if number > 0 {
+        of_source[number - 1].cumulative
+    } else {
+        0.0
+    };
+    f64::from(of_source[number].cumulative) - f64::from(before)
+}
+
+/// A light for a point, and its probability: `u` chooses the source, `u_light` the light.
+pub(super) fn choose_light_for<'a>(
+    inputs: &Inputs<'a>,
+    position: DVec3,
+    normal: DVec3,
+    [u, u_light]: [f64; 2],
+) -> (&'a Light, f64) {
+    let mut sum = 0.0;
+    let mut chosen = None;
+    for (source, probability) in sources(inputs, position, normal).filter(|(_, probability)| *probability > 0.0) {
+        // Rounding may leave the last number beyond all: the last source that can be chosen has it.
+        chosen = Some((source, probability));
+        sum += probability;
+        if sum > u {
+            break;
+        }
+    }
+    let (source, probability) = chosen.unwrap_or((&inputs.scene.light_sources[0], 1.0));
+    let (light, within) = choose_light_of(inputs, source, u_light);
+    (light, probability * within)
+}
+
+/// A light of a source, and its probability within that.
+pub(super) fn choose_light_of<'a>(inputs: &Inputs<'a>, source: &LightSource, u_light: f64) -> (&'a Light, f64) {
+    let (_, of_source) = lights_of(inputs, source);
+    let number = of_source.partition_point(|light| f64::from(light.cumulative) <= u_light);
+    let number = number.min(of_source.len() - 1);
+    (&of_source[number], probability_within(of_source, number))
+}
+
+fn has_light(source: &LightSource, light: u32) -> bool {
+    (source.first_light..source.first_light + source.light_count).contains(&light)
+}
+
+/// The probability of a light in [`choose_light_of`]; 0 of one of another source.
+pub(super) fn probability_of(inputs: &Inputs<'_>, source: &LightSource, light: u32) -> f64 {
+    if has_light(source, light) {
+        let (first, of_source) = lights_of(inputs, source);
+        probability_within(of_source, light as usize - first)
+    } else {
+        0.0
+    }
+}
+
+/// The probability of a light in [`choose_light_for`].
+pub(super) fn probability_for(inputs: &Inputs<'_>, position: DVec3, normal: DVec3, light: u32) -> f64 {
+    let found = sources(inputs, position, normal).find(|(source, _)| has_light(source, light));
+    found.map_or(0.0, |(source, probability)| {
+        probability * probability_of(inputs, source, light)
+    })
+}
