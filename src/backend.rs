@@ -183,7 +183,7 @@ impl Counters {
         let share = self.truncated_share(emitted);
         (self.truncated_paths > 0 && share < TELLING_SHARE).then(|| {
             format!(
-                "{} paths ended at --max-depth {max_depth}: less than {} of the light",
+                "note: {} paths ended at --max-depth {max_depth}: less than {} of the light",
                 self.truncated_paths,
                 percent(TELLING_SHARE)
             )

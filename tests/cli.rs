@@ -738,7 +738,7 @@ fn a_variant_and_a_scene_are_chosen_by_name() {
         .find(|line| line.contains("--scene-name"))
         .unwrap_or_default();
     assert!(
-        note.starts_with("scene 0 \"hall\" is rendered") && note.contains("1 \"attic\""),
+        note.starts_with("note: scene 0 \"hall\" is rendered") && note.contains("1 \"attic\""),
         "{text}"
     );
     let (blue, text) = centre(&["--variant", "blue", "--scene-name", "attic"]);

@@ -49,8 +49,13 @@ uint preference(Surface surface, Material material, vec3 incoming) {
     return kind << 28u | min(surface.object + 1u, 0xfffffffu);
 }
 
-// media: those that the ray is in, as far as its path knows.
-Interface interface_at(Hit hit, vec3 incoming, Media media, Random random) {
+// Whether it is a back that no camera sees.
+bool is_hidden_back(Surface surface, Material material, vec3 incoming) {
+    return (material.flags & BACK_HIDDEN) != 0u && dot(incoming, surface.geometric_normal) > 0.0;
+}
+
+// media: those that the ray is in, as far as its path knows. With `culls` backs that no camera sees aren't there.
+Interface interface_at(Hit hit, vec3 incoming, Media media, bool culls, Random random) {
     Interface place;
     place.surface = surface_at(hit);
     place.share = share_there(place.surface);
@@ -62,7 +67,8 @@ Interface interface_at(Hit hit, vec3 incoming, Media media, Random random) {
     Material material = material_at(first.material);
     vec3 n = first.geometric_normal;
     bool front = dot(incoming, n) < 0.0;
-    bool opaque = !is_dielectric(material);
+    bool hidden = CULLING && culls && is_hidden_back(first, material, incoming);
+    bool opaque = !is_dielectric(material) && !hidden;
     if (is_solid(material)) {
         cross_boundary(place, media, first, front);
     }
@@ -98,6 +104,9 @@ Interface interface_at(Hit hit, vec3 incoming, Media media, Random random) {
             continue;
         }
         Material other_material = material_at(other.material);
+        if (CULLING && culls && is_hidden_back(other, other_material, incoming)) {
+            continue;
+        }
         bool other_front = dot(incoming, other.geometric_normal) < 0.0;
         uint preference_of_other = preference(other, other_material, incoming);
         float share = share_there(other);
@@ -108,7 +117,7 @@ Interface interface_at(Hit hit, vec3 incoming, Media media, Random random) {
         }
         reach = max(reach, both);
         if (!is_dielectric(other_material)) {
-            if (!same_object && preference_of_other > preferred) {
+            if (preference_of_other > preferred) {
                 preferred = preference_of_other;
                 place.surface = other;
                 place.share = share;

@@ -13,8 +13,8 @@ struct Encounter {
     Media beyond;  // behind boundaries of dielectrics
 };
 
-Encounter encounter(Hit hit, vec3 incoming, Media media, Random random) {
-    Interface place = interface_at(hit, incoming, media, random);
+Encounter encounter(Hit hit, vec3 incoming, Media media, bool culls, Random random) {
+    Interface place = interface_at(hit, incoming, media, culls, random);
     Encounter met;
     met.surface = place.surface;
     met.material = material_of(met.surface);

@@ -51,18 +51,28 @@ Media with(Media media, uint medium) {
     return media;
 }
 
-// What a ray leaves at the back of a face that bounds this medium. One that it isn't in bounds the medium that is there: an inner
-// wall that is an object of its own.
-uint left_medium(Media media, uint medium) {
-    bool is_in = true;
-    if (NESTED) {
-        is_in = media.first == medium || any(equal(media.others, uvec3(medium))) || media.first == VACUUM;
-    }
-    return is_in ? medium : media.first;
-}
-
 float ior_of_medium(uint medium) {
     return medium == VACUUM ? 1.0 : TEXEL(Materials, MATERIAL_TEXELS * material_of_medium(medium) + 1u).w;
+}
+
+// What a ray leaves at the back of a face that bounds this medium. If it isn't in that, the face is a wall that is an object of
+// its own: it leaves what is most like it.
+uint left_medium(Media media, uint medium) {
+    uint left = medium;
+    if (NESTED) {
+        uvec4 all = uvec4(media.first, media.others);
+        bool is_in = any(equal(all, uvec4(medium)));
+        float ior = ior_of_medium(medium);
+        float least = 1e30;
+        for (uint i = 0u; i < 4u && !is_in; i++) {
+            bool same_material = material_of_medium(all[i]) == material_of_medium(medium);
+            float unlike = same_material ? -1.0 : abs(ior_of_medium(all[i]) - ior);
+            bool closer = all[i] != VACUUM && unlike < least;
+            left = closer ? all[i] : left;
+            least = closer ? unlike : least;
+        }
+    }
+    return left;
 }
 
 // What a medium leaves of light over a distance.

@@ -87,7 +87,7 @@ Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, Media media
     if (hit.triangle == MISS) {
         return Glimpse(radiance_from_afar(direction) + lamps, true);
     }
-    Encounter met = encounter(hit, direction, media, random);
+    Encounter met = encounter(hit, direction, media, false, random);
     bool dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
     vec3 emission = emits(met.material, met.facing.front)
                         ? emitted_radiance(met.material, -dot(direction, met.facing.geometric_normal))
@@ -170,12 +170,12 @@ void main() {
         if (loops_cut) {
             cut = true;
         } else if (hit.triangle != MISS) {
-            Encounter met = encounter(hit, branch.direction, branch.media, random);
+            bool culls = CULLING && branch.depth == 0u;
+            Encounter met = encounter(hit, branch.direction, branch.media, culls, random);
             Surface surface = met.surface;
             Material material = met.material;
             Facing facing = met.facing;
-            bool culled = CULLING && branch.depth == 0u && !facing.front && (material.flags & BACK_HIDDEN) != 0u;
-            if (culled) {
+            if (culls && is_hidden_back(surface, material, branch.direction)) {
                 progress = past(hit);
                 continue;
             }
@@ -187,6 +187,8 @@ void main() {
             if (met.hidden) {
                 branch.throughput *= met.tint;
                 branch.media = met.beyond;
+                branch.emission_seen = false;
+                branch.lamps_seen = false;
                 branch.origin = origin_towards(surface, branch.direction);
                 branch.ignored = surface.triangle;
                 continue;
@@ -335,7 +337,7 @@ void main() {
             }
         }
     }
-    if (cut) {
+    if (cut || loops_cut) {
         atomicAdd(status.cut_paths, 1u);
     }
     visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));

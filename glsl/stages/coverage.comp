@@ -98,7 +98,8 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     if (COINCIDENCE) {
         for (uint i = 1u; i < MOST_CROSSINGS && below.triangle != MISS && !loops_cut; i++) {
             Surface met = surface_at(below);
-            bool lies_on = (met.flags & (COINCIDENT | BACKED)) != 0u || is_dielectric(material_at(met.material));
+            bool glass = CONTACT && is_dielectric(material_at(met.material));
+            bool lies_on = glass || (met.flags & (COINCIDENT | BACKED)) != 0u;
             if (met.object == object || !lies_on) {
                 break;
             }

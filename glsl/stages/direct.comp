@@ -247,7 +247,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
             if (missed) {
                 return vec3(0.0);
             }
-            emitter = interface_at(hit, ray, IN_VACUUM, random).surface;
+            emitter = interface_at(hit, ray, IN_VACUUM, false, random).surface;
         }
         if (emitter.light == NO_LIGHT) {
             return vec3(0.0);

@@ -150,7 +150,7 @@ void main() {
             continue;
         }
         vec3 incoming = path.direction;
-        Encounter met = encounter(hit, incoming, path.media, random);
+        Encounter met = encounter(hit, incoming, path.media, false, random);
         Surface surface = met.surface;
         Material material = met.material;
         Facing facing = met.facing;

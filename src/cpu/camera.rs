@@ -66,7 +66,7 @@ fn glimpse(
         let sky = Environment::of(&inputs.scene.environment).at(ray.direction);
         return (sky.radiance + lamps, true);
     };
-    let met = Encounter::new(inputs, hit, ray.direction, media, random);
+    let met = Encounter::new(inputs, hit, ray.direction, media, false, random);
     let material = met.surface.material;
     let dark = material.surface == MATTE && rgb(material.base_color).max_element() == 0.0;
     if emits(&material, met.facing.front) {
@@ -251,13 +251,14 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                 break nothing_seen(branch.emitted, met_surface);
             };
             let incoming = branch.ray.direction;
-            let met = Encounter::new(inputs, hit, incoming, branch.media, &random);
+            let met = Encounter::new(inputs, hit, incoming, branch.media, culls, &random);
             let (surface, mut facing) = (met.surface, met.facing);
             branch.way += hit.t;
             branch.throughput *= transmittance(inputs, met.through, hit.t);
             if met.hidden {
                 branch.throughput *= met.tint;
                 branch.media = met.beyond;
+                (branch.emission_seen, branch.lamps_seen) = (false, false);
                 branch.ray.origin = surface.origin_towards(incoming);
                 branch.ignored = Some(surface.triangle);
                 continue;

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::Inputs;
 use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
-use super::media::{Media, bounded_medium, ior_of_medium};
+use super::media::{Media, Medium, bounded_medium, ior_of_medium};
 use super::surface::{DIELECTRIC, Facing, GLOSSY, ROUNDINGS, Surface, surface_of};
 use super::texture::{apply_textures, is_face_there, share_there};
 use super::vector::rgb;
@@ -38,6 +38,11 @@ fn is_front(surface: &Surface, incoming: DVec3) -> bool {
     incoming.dot(surface.geometric_normal) < 0.0
 }
 
+/// Whether it is a back that no camera sees.
+pub(super) fn is_hidden_back(surface: &Surface, incoming: DVec3) -> bool {
+    surface.material.flags & BACK_HIDDEN != 0 && incoming.dot(surface.geometric_normal) > 0.0
+}
+
 /// Of faces in one place that are no dielectrics', the highest is met.
 fn preference(surface: &Surface, incoming: DVec3) -> (bool, bool, bool, bool, u32) {
     let front = is_front(surface, incoming);
@@ -48,8 +53,8 @@ fn preference(surface: &Surface, incoming: DVec3) -> (bool, bool, bool, bool, u3
 }
 
 impl Interface {
-    /// `media`: those that the ray is in, as far as its path knows.
-    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, random: &Random) -> Self {
+    /// `media`: those that the ray is in, as far as its path knows. With `culls` backs that no camera sees aren't there.
+    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, culls: bool, random: &Random) -> Self {
         let first = surface_of(inputs.scene, hit);
         let mut place = Self {
             surface: first,
@@ -60,8 +65,9 @@ impl Interface {
             beyond: media,
         };
         let nested = inputs.scene.features.nested;
+        let bounded = |surface: &Surface| bounded_medium(inputs, media, surface, is_front(surface, incoming));
         if is_solid(&first.material) {
-            place.cross(media, &first, incoming, nested);
+            place.cross(bounded(&first), is_front(&first, incoming), nested);
         }
         let backed = first.flags & BACKED != 0 && !is_front(&first, incoming);
         if first.flags & (TOUCHED | COINCIDENT) == 0 && !backed {
@@ -70,7 +76,6 @@ impl Interface {
         let is_opaque = first.material.surface != DIELECTRIC;
         let mut preferred = is_opaque.then(|| preference(&first, incoming));
         let mut missing = None;
-        let bounded = |surface: &Surface| bounded_medium(media, surface, is_front(surface, incoming), nested);
         let mut solid: Option<Surface> = None;
         let mut reach = first.reach;
         for (other, at) in others(inputs, hit, &first) {
@@ -79,7 +84,7 @@ impl Interface {
             let apart = (other.position - first.position).dot(n).abs() > ROUNDINGS * n.abs().dot(both);
             let same_object = other.object == first.object;
             let doubles = same_object && other.geometric_normal.dot(n) < -PARALLEL;
-            if apart || (same_object && !doubles) {
+            if apart || (same_object && !doubles) || (culls && is_hidden_back(&other, incoming)) {
                 continue;
             }
             let preference = preference(&other, incoming);
@@ -91,7 +96,7 @@ impl Interface {
             }
             reach = reach.max(both);
             if other.material.surface != DIELECTRIC {
-                if !same_object && Some(preference) > preferred {
+                if Some(preference) > preferred {
                     preferred = Some(preference);
                     place.surface = other;
                     place.share = share;
@@ -100,7 +105,7 @@ impl Interface {
                 if doubles {
                     place.is_flat = true;
                 } else {
-                    place.cross(media, &other, incoming, nested);
+                    place.cross(bounded(&other), is_front(&other, incoming), nested);
                     place.tint *= rgb(other.material.base_color);
                     if solid.is_none_or(|solid| bounded(&other) < bounded(&solid)) {
                         solid = Some(other);
@@ -132,10 +137,8 @@ impl Interface {
         place
     }
 
-    /// As the ray, in these media, crosses a boundary of a solid dielectric.
-    fn cross(&mut self, media: Media, surface: &Surface, incoming: DVec3, nested: bool) {
-        let front = is_front(surface, incoming);
-        let medium = bounded_medium(media, surface, front, nested);
+    /// As the ray crosses a boundary of a medium.
+    fn cross(&mut self, medium: Medium, front: bool, nested: bool) {
         if front {
             if nested {
                 self.through = self.through.without(medium, nested);
@@ -184,8 +187,8 @@ pub(super) struct Encounter {
 }
 
 impl Encounter {
-    /// `media`: those that the ray is in, as far as its path knows.
-    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, random: &Random) -> Self {
+    /// As [`Interface::new`].
+    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, culls: bool, random: &Random) -> Self {
         let Interface {
             mut surface,
             share,
@@ -193,7 +196,7 @@ impl Encounter {
             tint,
             through,
             beyond,
-        } = Interface::new(inputs, hit, incoming, media, random);
+        } = Interface::new(inputs, hit, incoming, media, culls, random);
         apply_textures(inputs.scene, &mut surface);
         if is_flat {
             surface.material.thin = 1;

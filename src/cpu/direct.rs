@@ -237,7 +237,7 @@ fn sample_direct(
         let Some(hit) = seen.hit else {
             return seen.of(sky(environment.at(direction), direction));
         };
-        let met = Interface::new(inputs, hit, direction, Media::VACUUM, random);
+        let met = Interface::new(inputs, hit, direction, Media::VACUUM, false, random);
         (met.surface, seen)
     } else {
         let (light, probability) = match source {

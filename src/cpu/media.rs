@@ -8,7 +8,7 @@ use super::vector::rgb;
 use crate::layout::{Material, RANK};
 
 /// A medium: its object's rank, then its material. [`VACUUM`] comes last.
-type Medium = u32;
+pub(super) type Medium = u32;
 
 const VACUUM: Medium = u32::MAX;
 
@@ -46,12 +46,23 @@ impl Media {
     }
 }
 
-/// What a face bounds for a ray that meets it in these media. At the back of one that it isn't in, that is the medium that is
-/// there: an inner wall that is an object of its own.
-pub(super) fn bounded_medium(media: Media, surface: &Surface, front: bool, nested: bool) -> Medium {
+/// What a face bounds for a ray that meets it in these media. At the back of one that it isn't in, that is a wall that is an
+/// object of its own, it is what is most like it.
+pub(super) fn bounded_medium(inputs: &Inputs<'_>, media: Media, surface: &Surface, front: bool) -> Medium {
     let medium = (surface.flags >> RANK << RANK) | surface.material_index;
-    let is_in = !nested || media.0.contains(&medium) || media == Media::VACUUM;
-    if front || is_in { medium } else { media.first() }
+    let is_in = !inputs.scene.features.nested || media.0.contains(&medium);
+    if front || is_in {
+        return medium;
+    }
+    let unlike = |other: &Medium| {
+        if other & !(u32::MAX << RANK) == surface.material_index {
+            -1.0
+        } else {
+            (ior_of_medium(inputs, *other) - ior_of_medium(inputs, medium)).abs()
+        }
+    };
+    let others = media.0.into_iter().filter(|other| *other != VACUUM);
+    others.min_by(|a, b| unlike(a).total_cmp(&unlike(b))).unwrap_or(medium)
 }
 
 fn material_of_medium<'a>(inputs: &Inputs<'a>, medium: Medium) -> Option<&'a Material> {

@@ -110,7 +110,8 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         caustic: true,
         inverse_range: emission.inverse_range,
     };
-    for _ in 0..settings.max_depth {
+    let mut depth = 0;
+    while depth < settings.max_depth {
         if path.flux.max_element() <= 0.0 {
             return value;
         }
@@ -119,7 +120,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             return value;
         };
         let incoming = path.ray.direction;
-        let met = Encounter::new(inputs, hit, incoming, path.media, &random);
+        let met = Encounter::new(inputs, hit, incoming, path.media, false, &random);
         let (surface, mut facing) = (met.surface, met.facing);
         let mut material = surface.material;
         path.flux *= transmittance(inputs, met.through, hit.t);
@@ -135,6 +136,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
             path.ignored = Some(surface.triangle);
             continue;
         }
+        depth += 1;
         let mut u = random.next4();
         let (mixed, rest) = choose_part(&mut material, u[3]);
         u[3] = rest;

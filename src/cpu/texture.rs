@@ -4,11 +4,12 @@ use glam::{DVec2, DVec3, DVec4};
 use half::f16;
 
 use super::Inputs;
+use super::contact::is_hidden_back;
 use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
 use super::sampling::decode_direction;
 use super::surface::{Surface, surface_of};
 use super::vector::rgb;
-use crate::layout::{BACK_HIDDEN, BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED};
+use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED};
 use crate::random::Random;
 use crate::scene::PackedScene;
 
@@ -167,8 +168,7 @@ pub(super) fn nearest_seen(
     loop {
         let hit = nearest_hit_from(inputs, ray, progress, t_max, ignored)?;
         let met = surface_of(inputs.scene, hit);
-        let hidden = met.material.flags & BACK_HIDDEN != 0 && ray.direction.dot(met.geometric_normal) > 0.0;
-        if !(culls && hidden) && is_face_there(inputs.scene, &met, hit.at, random) {
+        if !(culls && is_hidden_back(&met, ray.direction)) && is_face_there(inputs.scene, &met, hit.at, random) {
             return Some(hit);
         }
         progress = Progress::past(hit);

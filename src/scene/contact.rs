@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use super::Placement;
 use super::features::DIELECTRIC;
 use crate::layout::{
-    BACK_EMITS, BACKED, BvhRecord, COINCIDENT, Instance, LEAF, Material, PLACEMENT_RECORD, ShadingTriangle, TOUCHED,
+    BACK_EMITS, BACKED, BvhRecord, COINCIDENT, Instance, LEAF, Material, OPAQUE, PLACEMENT_RECORD, ShadingTriangle,
+    TOUCHED,
 };
 
 /// As `offset_origin` in `glsl/shared/scene.glsl`: rays leave surfaces by that much of their corners' coordinates.
@@ -18,7 +19,9 @@ const ROUNDINGS: f32 = 16.0 / 16_777_216.0;
 const PARALLEL: f32 = 0.99;
 /// Triangles of all instances of a primitive that are looked at. Where there are more, dielectrics are all taken to touch
 /// something, which costs the kernels a look, and others to touch nothing.
-const MOST_PLACED: usize = 1 << 20;
+const MOST_PLACED: usize = 1 << 18;
+/// Nodes and leaves that are looked at for each triangle.
+const MOST_VISITS: usize = 1 << 13;
 /// Beside the flags of a triangle: a face of the same object lies there and looks to the other side.
 const DOUBLED: u32 = 1 << 31;
 
@@ -177,7 +180,10 @@ impl Face {
         // The boxes of render space know nothing of what instances in them are uncertain by.
         let uncertain = Vec3::splat(scene.places.iter().map(|place| place.reach).fold(0.0, f32::max));
         let mut stack = vec![(0, None)];
-        while let Some((reference, place)) = stack.pop() {
+        for _ in 0..MOST_VISITS {
+            let Some((reference, place)) = stack.pop() else {
+                return found;
+            };
             let first = (reference & !LEAF) as usize;
             if reference & LEAF == 0 {
                 let node = &scene.records[first];
@@ -203,10 +209,14 @@ impl Face {
                 let other_material = scene.triangles[number].material;
                 found |= match place {
                     None => self.contact(&scene.faces[number], scene, [material, other_material]),
-                    Some(_) => {
+                    Some(place) => {
                         let corners = [record.row0, record.row1, record.row2].map(xyz);
-                        let other = Self::of_corners(corners, 0, place);
-                        self.contact(&other, scene, [material, other_material])
+                        if self.is_near(corners.map(|corner| place.placement.point(corner)), place.reach) {
+                            let other = Self::of_corners(corners, 0, Some(place));
+                            self.contact(&other, scene, [material, other_material])
+                        } else {
+                            0
+                        }
                     }
                 };
                 if found == all {
@@ -217,7 +227,13 @@ impl Face {
                 }
             }
         }
-        found
+        // A heap of triangles in one place: what isn't looked at is taken as above.
+        if scene.is_dielectric(material) { TOUCHED } else { found }
+    }
+
+    /// Whether a box around corners meets this face's.
+    fn is_near(&self, [a, b, c]: [Vec3; 3], reach: f32) -> bool {
+        self.meets_box(a.min(b).min(c) - reach, a.max(b).max(c) + reach)
     }
 
     fn meets_box(&self, low: Vec3, high: Vec3) -> bool {
@@ -229,7 +245,9 @@ impl Face {
     fn contact(&self, other: &Self, scene: &Scene<'_>, materials: [u32; 2]) -> u32 {
         let cosine = self.normal.dot(other.normal);
         let same_object = self.object == other.object;
-        if cosine.abs() <= PARALLEL || (same_object && cosine > 0.0) || !self.touches(other) {
+        let see_through = scene.materials[materials[0] as usize].alpha_mode != OPAQUE;
+        let alike = same_object && cosine > 0.0 && !see_through;
+        if cosine.abs() <= PARALLEL || alike || !self.touches(other) {
             return 0;
         }
         let [own, others] = materials.map(|material| &scene.materials[material as usize]);
@@ -240,8 +258,11 @@ impl Face {
         if others.surface == DIELECTRIC || !self.overlaps(other) {
             return 0;
         }
-        let shines_through = others.flags & BACK_EMITS != 0 && others.emission != [0.0; 3];
+        let shines_through = others.flags & BACK_EMITS != 0 && others.emission != [0.0; 3] && !same_object;
+        let emits = others.emission != [0.0; 3];
         match (same_object, cosine > 0.0 || shines_through) {
+            // Only where they emit it matters which of them is met.
+            (true, false) if emits => DOUBLED | BACKED,
             (true, _) => DOUBLED,
             (false, true) => COINCIDENT,
             (false, false) => BACKED,

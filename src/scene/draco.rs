@@ -69,7 +69,7 @@ pub(super) fn decompress(document: &mut Document, warnings: &mut Warnings) -> Ch
             }
         }
     }
-    Ok(())
+    document.budget.take(decoder.bytes, "decompressed data")
 }
 
 /// What the accessors of a primitive become; the indices have no name.

@@ -43,6 +43,7 @@ impl Nesting {
             .filter(|(_, object)| is_solid(object.material))
             .map(|(object, _)| Solid::of(scene, object))
             .collect();
+        let any_solid = !solids.is_empty();
         let mut nests = vec![false; scene.objects.len()];
         solids.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
         for (i, solid) in solids.iter().enumerate() {
@@ -56,9 +57,9 @@ impl Nesting {
         }
         solids.retain(|solid| nests[solid.object]);
         solids.sort_by(|a, b| a.volume.total_cmp(&b.volume).then(a.object.cmp(&b.object)));
-        if !solids.is_empty() && scene.materials.len() > MOST_MATERIALS {
+        if any_solid && scene.materials.len() > MOST_MATERIALS {
             return Err(format!(
-                "has {} materials, but with glass inside glass at most {MOST_MATERIALS} are supported; merge equal ones",
+                "has {} materials, but with solid glass at most {MOST_MATERIALS} are supported; merge equal ones",
                 scene.materials.len()
             ));
         }

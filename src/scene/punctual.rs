@@ -15,6 +15,10 @@ use super::{LoadOptions, Normalisation};
 /// good as the same.
 const NARROWEST_EDGE: f64 = 1e-4;
 
+/// Below and above that, in render units, a light's radius is none or refused.
+const SMALLEST_RADIUS: f64 = 1e-9;
+const LARGEST_RADIUS: f64 = 1e4;
+
 /// How a punctual light shines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Emission {
@@ -207,8 +211,17 @@ fn place(
         extent: if is_directional {
             0.5 * options.sun_angle.to_radians()
         } else {
-            options.light_radius * normalisation.scale
+            radius_of(options.light_radius * normalisation.scale)?
         },
         range: range.filter(|_| !is_directional),
     })
+}
+/// The radius of a point or spot in render units. One that the scene's coordinates can't tell from none is none.
+fn radius_of(radius: f64) -> Check<f64> {
+    if radius > LARGEST_RADIUS {
+        return Err(format!(
+            "--light-radius is more than {LARGEST_RADIUS} times as large as the scene; give it in the scene's units"
+        ));
+    }
+    Ok(if radius < SMALLEST_RADIUS { 0.0 } else { radius })
 }

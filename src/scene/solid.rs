@@ -99,7 +99,9 @@ fn is_closed(geometry: &Geometry, objects: &[usize]) -> bool {
             });
             let origin = *first.get_or_insert(corners[0].as_dvec3());
             let [a, b, c] = corners.map(|corner| corner.as_dvec3() - origin);
-            volume += DVec3::dot(a, b.cross(c));
+            // Where fronts become backs, the renderer turns them round.
+            let mirrored = placement.is_some_and(|placement| placement.is_mirrored());
+            volume += DVec3::dot(a, b.cross(c)) * if mirrored { -1.0 } else { 1.0 };
             // −0 and 0 are one place.
             let keys = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
             for (from, to) in [(0, 1), (1, 2), (2, 0)] {

@@ -138,6 +138,42 @@ fn a_lamp_flush_with_a_ceiling_is_seen_in_every_order() {
     }
 }
 
+/// Both faces of one mesh shine, each to its side.
+#[test]
+fn a_doubled_lamp_is_seen_in_a_mirror_in_every_order() {
+    for down_first in [true, false] {
+        assert_shows(3.0, &format!("down first: {down_first}"), |model| {
+            let (mirror, lamp) = (model.mirror(), model.black(3.0));
+            model.mesh(mirror, &floor(true, 1.0));
+            let mut sides =
+                [false, true].map(|up| floor(up, 1.9).map(|triangle| triangle.map(|corner| corner + Vec3::Y * 0.8)));
+            if !down_first {
+                sides.reverse();
+            }
+            model.mesh(lamp, sides.as_flattened());
+        });
+    }
+}
+
+/// A black poster in a window has its back to the camera.
+#[test]
+fn a_poster_in_a_window_is_not_seen_from_behind() {
+    for poster_first in [true, false] {
+        assert_shows(1.0, &format!("poster first: {poster_first}"), |model| {
+            let (glass, black) = (model.glass(1.5), model.black(0.0));
+            let volume = format!("/materials/{glass}/extensions/KHR_materials_volume");
+            model.file.remove(&volume);
+            let mut faces = [(glass, floor(true, 1.0)), (black, floor(false, 1.0))];
+            if poster_first {
+                faces.reverse();
+            }
+            for (material, triangles) in faces {
+                model.mesh(material, &triangles);
+            }
+        });
+    }
+}
+
 /// In light of 1 from all sides a pane shows 1 but for what is behind it: a black wall, so that it shows what it reflects. One
 /// pane's 4 % at right angles, or two panes' 7.7 %.
 #[test]

@@ -202,6 +202,24 @@ fn glass_under_water_is_in_water() {
     assert_seen(expected, 0.01, "submerged", &bodies);
 }
 
+/// The walls of a glass may be meshes of their own, of materials of their own.
+#[test]
+fn a_glass_of_several_meshes_keeps_the_colour_of_the_liquid_pushed_into_it() {
+    let expected = seen(&[(1.5, 1.0), (1.33, 0.5f64.powf(1.8)), (1.5, 1.0)]);
+    let body = |ior, keeps, half, hollow| Body {
+        ior,
+        keeps,
+        half,
+        hollow,
+    };
+    let bodies = [
+        body(1.5, 1.0, 1.0, None),
+        body(1.5, 1.0, 0.0, Some(0.9)),
+        body(1.33, 0.5, 0.901, None),
+    ];
+    assert_seen(expected, 0.01, "walls apart", &bodies);
+}
+
 /// A bubble may be a mesh of its own whose fronts look inwards: behind it is air, not glass.
 #[test]
 fn a_bubble_with_its_fronts_inside_is_air() {
