@@ -289,6 +289,18 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     return weight * radiance * (cos_surface / density) * tint;
 }
 
+// Adds what it brings, or what that would be unbent.
+void add_direct(VisiblePoint visible_point, uint slot, uint of_source, bool asks, inout Random random, inout vec3 radiance,
+                inout float unbent) {
+    bool behind_glass;
+    vec3 sampled = sample_direct(visible_point, slot, of_source, asks, random, behind_glass);
+    if (behind_glass) {
+        unbent += finite(sampled) ? mean_of(sampled) : 0.0;
+    } else {
+        radiance += sampled;
+    }
+}
+
 void main() {
     uint slot = invocation_index();
     if (slot >= slots() || status.again != 0u) {
@@ -305,18 +317,13 @@ void main() {
         asks = asks_behind_glass(slot);
         CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
         Random random = random_of_pixel(LIGHT_SAMPLE, slot, turn, settings.seed);
-        uint questions = 1u;
+        // Not one loop for both: around a single question it costs a quarter of the stage.
         if (FEW_SOURCES) {
-            questions = settings.light_source_count;
-        }
-        for (uint source = 0u; source < questions; source++) {
-            bool behind_glass;
-            vec3 sampled = sample_direct(visible_point, slot, source, asks, random, behind_glass);
-            if (behind_glass) {
-                unbent += finite(sampled) ? mean_of(sampled) : 0.0;
-            } else {
-                radiance += sampled;
+            for (uint source = 0u; source < settings.light_source_count; source++) {
+                add_direct(visible_point, slot, source, asks, random, radiance, unbent);
             }
+        } else {
+            add_direct(visible_point, slot, 0u, asks, random, radiance, unbent);
         }
     }
     if (!finite(radiance)) {
