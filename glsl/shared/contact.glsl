@@ -9,7 +9,7 @@ const float PARALLEL = 0.99;
 struct Interface {
     Surface surface; // that it meets
     float share;     // chance of that, where something isn't there everywhere
-    bool is_flat;       // a solid dielectric without thickness
+    bool is_flat;    // a solid dielectric without thickness
     vec3 tint;       // of the other boundaries of dielectrics there
     Media through;   // that the ray came through
     Media beyond;    // behind boundaries of dielectrics
@@ -21,9 +21,8 @@ uint bounded_medium(Media media, Surface surface, bool front) {
     return front ? medium : left_medium(media, medium);
 }
 
-// As the ray, in these media, crosses a boundary of a solid dielectric.
-void cross_boundary(inout Interface place, Media media, Surface surface, bool front) {
-    uint medium = bounded_medium(media, surface, front);
+// As the ray crosses a boundary of a medium.
+void cross_boundary(inout Interface place, uint medium, bool front) {
     if (front) {
         if (NESTED) {
             place.through = without(place.through, medium);
@@ -69,8 +68,10 @@ Interface interface_at(Hit hit, vec3 incoming, Media media, bool culls, Random r
     bool front = dot(incoming, n) < 0.0;
     bool hidden = CULLING && culls && is_hidden_back(first, material, incoming);
     bool opaque = !is_dielectric(material) && !hidden;
+    uint own = VACUUM;
     if (is_solid(material)) {
-        cross_boundary(place, media, first, front);
+        own = bounded_medium(media, first, front);
+        cross_boundary(place, own, front);
     }
     bool touched = CONTACT && (first.flags & TOUCHED) != 0u;
     bool coincides = COINCIDENCE && ((first.flags & COINCIDENT) != 0u || (!front && (first.flags & BACKED) != 0u));
@@ -127,9 +128,9 @@ Interface interface_at(Hit hit, vec3 incoming, Media media, bool culls, Random r
             if (doubles) {
                 place.is_flat = true;
             } else {
-                cross_boundary(place, media, other, other_front);
-                place.tint *= other_material.base_color;
                 uint bounded = bounded_medium(media, other, other_front);
+                cross_boundary(place, bounded, other_front);
+                place.tint *= other_material.base_color;
                 bool lower = bounded < solid;
                 solid = min(solid, bounded);
                 if (lower) {
@@ -149,7 +150,6 @@ Interface interface_at(Hit hit, vec3 incoming, Media media, bool culls, Random r
         place.beyond = media;
     } else if (solid != VACUUM) {
         // The boundary is that of what is there on either side.
-        uint own = bounded_medium(media, first, front);
         bool counts = is_solid(material) && (own == place.through.first || own == place.beyond.first);
         if (!counts) {
             place.surface = solid_surface;

@@ -97,7 +97,8 @@ fn emit_aimed(inputs: &Inputs<'_>, table: &Table, u: [f64; 4], w: [f64; 4]) -> E
     let chosen = table.choose(u, w);
     let [x, y, direction_x, direction_y, number] = table.coordinates(chosen);
     let cell = &table.cells[chosen.cell];
-    let (light, probability) = light_of(&inputs.scene.lights, cell, number);
+    let of_source = cell.first_light..cell.first_light + cell.lights;
+    let (light, probability) = light_of(&inputs.scene.lights, of_source, number);
     let light = &inputs.scene.lights[light];
     let index = (cell.target as usize).min(table.spheres.len());
     let target = table.spheres.get(index).copied().map(Sphere::of);

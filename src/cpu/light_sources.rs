@@ -1,9 +1,12 @@
 //! Which source of light a point asks: the counterpart of `glsl/shared/light_sources.glsl`.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::Inputs;
 use super::vector::rgb;
+use crate::emission::light_of;
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, LightSource, TRIANGLE_LIGHT};
 
 /// The part of all choices among those that can bring anything that is made without knowing the point.
@@ -74,22 +77,6 @@ fn sources<'a>(
     of_scene.iter().zip(most).map(probability)
 }
 
-/// The lights of a source, and the index of the first one.
-fn lights_of<'a>(inputs: &Inputs<'a>, source: &LightSource) -> (usize, &'a [Light]) {
-    let first = source.first_light as usize;
-    (first, &inputs.scene.lights[first..first + source.light_count as usize])
-}
-
-/// A light's probability within its source.
-fn probability_within(of_source: &[Light], number: usize) -> f64 {
-    let before = if number > 0 {
-        of_source[number - 1].cumulative
-    } else {
-        0.0
-    };
-    f64::from(of_source[number].cumulative) - f64::from(before)
-}
-
 /// A light for a point, and its probability: `u` chooses the source, `u_light` the light.
 pub(super) fn choose_light_for<'a>(
     inputs: &Inputs<'a>,
@@ -114,29 +101,33 @@ pub(super) fn choose_light_for<'a>(
 
 /// A light of a source, and its probability within that.
 pub(super) fn choose_light_of<'a>(inputs: &Inputs<'a>, source: &LightSource, u_light: f64) -> (&'a Light, f64) {
-    let (_, of_source) = lights_of(inputs, source);
-    let number = of_source.partition_point(|light| f64::from(light.cumulative) <= u_light);
-    let number = number.min(of_source.len() - 1);
-    (&of_source[number], probability_within(of_source, number))
+    let (light, probability) = light_of(&inputs.scene.lights, range_of(source), u_light);
+    (&inputs.scene.lights[light], probability)
 }
 
-fn has_light(source: &LightSource, light: u32) -> bool {
-    (source.first_light..source.first_light + source.light_count).contains(&light)
+/// The lights of a source.
+fn range_of(source: &LightSource) -> Range<u32> {
+    source.first_light..source.first_light + source.light_count
 }
 
 /// The probability of a light in [`choose_light_of`]; 0 of one of another source.
 pub(super) fn probability_of(inputs: &Inputs<'_>, source: &LightSource, light: u32) -> f64 {
-    if has_light(source, light) {
-        let (first, of_source) = lights_of(inputs, source);
-        probability_within(of_source, light as usize - first)
+    let range = range_of(source);
+    if !range.contains(&light) {
+        return 0.0;
+    }
+    let cumulative = |light: u32| f64::from(inputs.scene.lights[light as usize].cumulative);
+    let before = if light > range.start {
+        cumulative(light - 1)
     } else {
         0.0
-    }
+    };
+    cumulative(light) - before
 }
 
 /// The probability of a light in [`choose_light_for`].
 pub(super) fn probability_for(inputs: &Inputs<'_>, position: DVec3, normal: DVec3, light: u32) -> f64 {
-    let found = sources(inputs, position, normal).find(|(source, _)| has_light(source, light));
+    let found = sources(inputs, position, normal).find(|(source, _)| range_of(source).contains(&light));
     found.map_or(0.0, |(source, probability)| {
         probability * probability_of(inputs, source, light)
     })

@@ -1,5 +1,7 @@
 //! The table that aims photon paths: `glsl/shared/emission_table.glsl`.
 
+use std::ops::Range;
+
 use crate::alias::{self, AliasCell};
 use crate::layout::{EmissionCell, Light};
 
@@ -66,10 +68,10 @@ impl Table {
     }
 }
 
-/// Of a cell's lights the one that a number in [0, 1) chooses; its index, and its probability within the source.
-pub fn light_of(lights: &[Light], cell: &EmissionCell, number: f64) -> (usize, f64) {
-    let first = cell.first_light as usize;
-    let of_source = &lights[first..first + cell.lights as usize];
+/// Of a source's lights the one that a number in [0, 1) chooses; its index, and its probability within the source.
+pub fn light_of(lights: &[Light], source: Range<u32>, number: f64) -> (usize, f64) {
+    let first = source.start as usize;
+    let of_source = &lights[first..source.end as usize];
     let chosen = of_source
         .partition_point(|light| f64::from(light.cumulative) <= number)
         .min(of_source.len() - 1);

@@ -76,18 +76,26 @@ fn floor(up: bool, scale: f32) -> [[Vec3; 3]; 2] {
     triangles.map(|[a, b, c]| if up { [a, b, c] } else { [a, c, b] })
 }
 
+/// Adds two objects, the second one first where they are reversed.
+fn add_in_order(model: &mut Model, mut faces: [(usize, [[Vec3; 3]; 2]); 2], reversed: bool) {
+    if reversed {
+        faces.reverse();
+    }
+    for (material, triangles) in faces {
+        model.mesh(material, &triangles);
+    }
+}
+
 #[test]
 fn of_doubled_faces_a_ray_meets_the_one_that_looks_to_it_in_every_order() {
     for white_first in [true, false] {
         assert_shows(0.8, &format!("white first: {white_first}"), |model| {
             let (white, black) = (model.matte([0.8; 3], 0.0), model.black(0.0));
-            let mut faces = [(white, floor(true, 1.0)), (black, floor(false, 1.0))];
-            if !white_first {
-                faces.reverse();
-            }
-            for (material, triangles) in faces {
-                model.mesh(material, &triangles);
-            }
+            add_in_order(
+                model,
+                [(white, floor(true, 1.0)), (black, floor(false, 1.0))],
+                !white_first,
+            );
         });
     }
     assert_shows(0.8, "both in one mesh", |model| {
@@ -109,13 +117,11 @@ fn a_label_shows_the_wall_that_it_lies_on_where_it_is_clear() {
                     model.file.set(&format!("/materials/{label}/alphaMode"), json!(mode));
                     let color = format!("/materials/{label}/pbrMetallicRoughness/baseColorFactor");
                     model.file.set(&color, json!([albedo, albedo, albedo, alpha]));
-                    let mut faces = [(white, floor(true, 1.0)), (label, floor(true, scale))];
-                    if label_first {
-                        faces.reverse();
-                    }
-                    for (material, triangles) in faces {
-                        model.mesh(material, &triangles);
-                    }
+                    add_in_order(
+                        model,
+                        [(white, floor(true, 1.0)), (label, floor(true, scale))],
+                        label_first,
+                    );
                 });
             }
         }
@@ -127,13 +133,11 @@ fn a_lamp_flush_with_a_ceiling_is_seen_in_every_order() {
     for lamp_first in [true, false] {
         assert_shows(3.0, &format!("lamp first: {lamp_first}"), |model| {
             let (white, lamp) = (model.matte([0.8; 3], 0.0), model.black(3.0));
-            let mut faces = [(lamp, floor(true, 0.8)), (white, floor(true, 1.0))];
-            if !lamp_first {
-                faces.reverse();
-            }
-            for (material, triangles) in faces {
-                model.mesh(material, &triangles);
-            }
+            add_in_order(
+                model,
+                [(lamp, floor(true, 0.8)), (white, floor(true, 1.0))],
+                !lamp_first,
+            );
         });
     }
 }
@@ -163,13 +167,11 @@ fn a_poster_in_a_window_is_not_seen_from_behind() {
             let (glass, black) = (model.glass(1.5), model.black(0.0));
             let volume = format!("/materials/{glass}/extensions/KHR_materials_volume");
             model.file.remove(&volume);
-            let mut faces = [(glass, floor(true, 1.0)), (black, floor(false, 1.0))];
-            if poster_first {
-                faces.reverse();
-            }
-            for (material, triangles) in faces {
-                model.mesh(material, &triangles);
-            }
+            add_in_order(
+                model,
+                [(glass, floor(true, 1.0)), (black, floor(false, 1.0))],
+                poster_first,
+            );
         });
     }
 }

@@ -19,6 +19,15 @@ struct Body {
     hollow: Option<f32>,
 }
 
+fn body(ior: f32, keeps: f32, half: f32, hollow: Option<f32>) -> Body {
+    Body {
+        ior,
+        keeps,
+        half,
+        hollow,
+    }
+}
+
 /// Radiance of the middle pixel by kernels and by their twin. Light of 1 comes from all sides.
 fn middle(bodies: &[Body]) -> [f64; 2] {
     let scene = scene(bodies);
@@ -100,18 +109,8 @@ fn assert_seen(expected: f64, tolerance: f64, what: &str, bodies: &[Body]) {
 #[test]
 fn liquid_that_overlaps_its_glass_absorbs_along_the_length_that_it_fills() {
     for overlap in [-1e-3, 0.0, 1e-3, 0.05] {
-        let liquid = Body {
-            ior: 1.0,
-            keeps: 0.5,
-            half: 0.9 + overlap,
-            hollow: None,
-        };
-        let glass = Body {
-            ior: 1.0,
-            keeps: 1.0,
-            half: 1.0,
-            hollow: Some(0.9),
-        };
+        let liquid = body(1.0, 0.5, 0.9 + overlap, None);
+        let glass = body(1.0, 1.0, 1.0, Some(0.9));
         // The glass has the smaller volume, and so is what is there.
         let length = 2.0 * f64::from(0.9f32.min(0.9 + overlap));
         assert_seen(
@@ -130,20 +129,7 @@ fn liquid_in_glass_looks_alike_whether_they_touch_or_overlap() {
     let expected = seen(&[(1.5, 1.0), (1.33, 0.5f64.powf(1.8)), (1.5, 1.0)]);
     for overlap in [0.0, 1e-3] {
         for liquid_first in [true, false] {
-            let mut bodies = [
-                Body {
-                    ior: 1.33,
-                    keeps: 0.5,
-                    half: 0.9 + overlap,
-                    hollow: None,
-                },
-                Body {
-                    ior: 1.5,
-                    keeps: 1.0,
-                    half: 1.0,
-                    hollow: Some(0.9),
-                },
-            ];
+            let mut bodies = [body(1.33, 0.5, 0.9 + overlap, None), body(1.5, 1.0, 1.0, Some(0.9))];
             if !liquid_first {
                 bodies.reverse();
             }
@@ -162,20 +148,7 @@ fn liquid_in_glass_looks_alike_whether_they_touch_or_overlap() {
 fn a_gap_between_liquid_and_glass_is_two_boundaries_more() {
     let air = (1.0, 1.0);
     let expected = seen(&[(1.5, 1.0), air, (1.33, 0.5f64.powf(1.798)), air, (1.5, 1.0)]);
-    let bodies = [
-        Body {
-            ior: 1.33,
-            keeps: 0.5,
-            half: 0.899,
-            hollow: None,
-        },
-        Body {
-            ior: 1.5,
-            keeps: 1.0,
-            half: 1.0,
-            hollow: Some(0.9),
-        },
-    ];
+    let bodies = [body(1.33, 0.5, 0.899, None), body(1.5, 1.0, 1.0, Some(0.9))];
     assert_seen(expected, 0.01, "gap", &bodies);
 }
 
@@ -185,20 +158,7 @@ fn a_gap_between_liquid_and_glass_is_two_boundaries_more() {
 fn glass_under_water_is_in_water() {
     let side = (1.33, 0.4f64.powf(0.5));
     let expected = seen(&[side, (2.0, 1.0), side]);
-    let bodies = [
-        Body {
-            ior: 1.33,
-            keeps: 0.4,
-            half: 1.0,
-            hollow: None,
-        },
-        Body {
-            ior: 2.0,
-            keeps: 1.0,
-            half: 0.5,
-            hollow: None,
-        },
-    ];
+    let bodies = [body(1.33, 0.4, 1.0, None), body(2.0, 1.0, 0.5, None)];
     assert_seen(expected, 0.01, "submerged", &bodies);
 }
 
@@ -206,12 +166,6 @@ fn glass_under_water_is_in_water() {
 #[test]
 fn a_glass_of_several_meshes_keeps_the_colour_of_the_liquid_pushed_into_it() {
     let expected = seen(&[(1.5, 1.0), (1.33, 0.5f64.powf(1.8)), (1.5, 1.0)]);
-    let body = |ior, keeps, half, hollow| Body {
-        ior,
-        keeps,
-        half,
-        hollow,
-    };
     let bodies = [
         body(1.5, 1.0, 1.0, None),
         body(1.5, 1.0, 0.0, Some(0.9)),
@@ -224,19 +178,6 @@ fn a_glass_of_several_meshes_keeps_the_colour_of_the_liquid_pushed_into_it() {
 #[test]
 fn a_bubble_with_its_fronts_inside_is_air() {
     let expected = seen(&[(1.5, 0.4f64.powf(0.5)), (1.0, 1.0), (1.5, 0.4f64.powf(0.5))]);
-    let bodies = [
-        Body {
-            ior: 1.5,
-            keeps: 0.4,
-            half: 1.0,
-            hollow: None,
-        },
-        Body {
-            ior: 1.5,
-            keeps: 0.4,
-            half: 0.0,
-            hollow: Some(0.5),
-        },
-    ];
+    let bodies = [body(1.5, 0.4, 1.0, None), body(1.5, 0.4, 0.0, Some(0.5))];
     assert_seen(expected, 0.01, "bubble", &bodies);
 }
