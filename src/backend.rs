@@ -281,5 +281,6 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         padding0: 0,
         padding1: 0,
         padding2: 0,
+        camera_media: scene.immersion.media_at(camera.position),
     }
 }

@@ -125,7 +125,7 @@ macro_rules! device_structs {
 
 device_structs! {
     /// What stays the same through a render. Lengths in render units.
-    pub struct Settings: 176 {
+    pub struct Settings: 192 {
         /// xyz: centre of projection; w: radius of the lens.
         pub camera_position: [f32; 4],
         /// xyz: to the picture's right edge, at distance 1; w: distance along the direction of view of what is in focus.
@@ -185,6 +185,8 @@ device_structs! {
         pub padding1: u32,
         /// Zero.
         pub padding2: u32,
+        /// Names of the media that the camera is in, the lowest first; 2³² − 1 where there are fewer.
+        pub camera_media: [u32; 4],
     }
 
     /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf, or one of the two of an

@@ -32,6 +32,8 @@ pub enum BufferId {
     NearLights,
     /// [`crate::layout::LightSource`]s.
     LightSources,
+    /// Names of the media that each light is in: see `scene/immersion.rs`.
+    MediaOfLights,
     /// What shines from afar, and how directions are chosen from it; see `glsl/shared/environment.glsl`.
     Environment,
     /// Where aimed photon paths start; see [`crate::emission::Table::texels`].

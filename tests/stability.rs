@@ -19,6 +19,8 @@ mod coincidence;
 mod geometry;
 #[path = "stability/glass.rs"]
 mod glass;
+#[path = "stability/immersion.rs"]
+mod immersion;
 #[path = "stability/lights.rs"]
 mod lights;
 #[path = "stability/model.rs"]

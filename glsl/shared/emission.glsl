@@ -11,6 +11,7 @@ struct Emission {
     vec3 flux;
     PlacedTriangle ignored; // the triangle that it leaves
     float inverse_range; // of a punctual light
+    Media media;         // that it starts in
 };
 
 // What paths are to pass through.
@@ -72,7 +73,7 @@ AimedStart emit_from_afar(vec3 towards, vec3 irradiance, float area, vec2 place,
     vec3 passed = target.sphere.xyz + basis(-towards) * vec3(radius * disc_point(place), 0.0);
     vec3 origin = passed + towards * (scene_radius - dot(target.sphere.xyz, towards));
     float disc = target.everything ? area : PI * radius * radius;
-    return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0), passed, true, true);
+    return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0, IN_VACUUM), passed, true, true);
 }
 
 AimedStart emit_directional(PunctualLight light, float area, vec2 place, vec2 turn, Target target) {
@@ -90,7 +91,7 @@ AimedStart emit_directional(PunctualLight light, float area, vec2 place, vec2 tu
         area = PI * radius * radius;
         origin -= light.direction * dot(passed - light.position, light.direction);
     }
-    return AimedStart(Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0), passed, true, true);
+    return AimedStart(Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0, IN_VACUUM), passed, true, true);
 }
 
 AimedStart emit_environment(float area, vec2 place, vec2 direction, Target target) {
@@ -132,7 +133,7 @@ AimedStart emit_point(PunctualLight light, uint kind, vec2 place, vec2 u, Target
         origin += basis(direction) * vec3(light.extent * disc_point(place), 0.0);
         on_target = false;
     }
-    return AimedStart(Emission(origin, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range), origin, false,
+    return AimedStart(Emission(origin, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range, IN_VACUUM), origin, false,
                       on_target);
 }
 
@@ -164,7 +165,7 @@ AimedStart emit_triangle(Light light, vec2 place, vec2 u, float side, Target tar
     }
     vec3 flux = emitted_radiance(material, max(0.0, dot(direction, normal))) *
                 (projected * sides * light.area * share_there(emitter));
-    return AimedStart(Emission(origin, direction, flux, triangle, 0.0), origin, false, in_cone);
+    return AimedStart(Emission(origin, direction, flux, triangle, 0.0, IN_VACUUM), origin, false, in_cone);
 }
 
 // From a light towards a target; flux over the density of the coordinates' choice.
@@ -215,7 +216,7 @@ Emission emit_aimed(vec4 u, vec4 w) {
     Start start = choose_start(size, u, w);
     if (start.weight == 0.0) {
         // Not to be traced, see emission::Aim.
-        return Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0);
+        return Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0, IN_VACUUM);
     }
     Target target = EVERYTHING;
     if (start.target < size.targets) {
@@ -223,6 +224,7 @@ Emission emit_aimed(vec4 u, vec4 w) {
     }
     AimedStart aimed = emit_from(start.light, start.place, start.direction, w.y, target);
     Emission emission = aimed.emission;
+    emission.media = media_of_light(start.light);
     bool kept = meets_first(size, start.target, aimed.on_target, aimed.passed, emission.direction, aimed.from_afar);
     emission.flux *= kept ? start.weight / start.probability : 0.0;
     return emission;
@@ -238,5 +240,6 @@ Emission emit(inout Random random) {
     Choice choice = choose_light(u.x, w.xz);
     Emission emission = emit_from(choice.index, vec2(choice.rest, u.y), u.zw, w.y, EVERYTHING).emission;
     emission.flux /= light_at(choice.index).probability;
+    emission.media = media_of_light(choice.index);
     return emission;
 }

@@ -70,12 +70,12 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
         vec3 response = vec3(0.0);
         if (is_dielectric(material)) {
             response = glass_response(facing, viewer, l, material, met.outside) * (same_side ? vec3(1.0) : met.tint);
-            if (ABSORPTION) {
-                float way = light.kind == DIRECTIONAL_LIGHT ? 1e30 : length(arriving.ray);
-                response *= transmittance(same_side ? met.through.first : met.beyond.first, way);
-            }
         } else if (same_side && nl > 0.0) {
             response = brdf(reflector, facing.shading_normal, viewer, l) * nl;
+        }
+        if (ABSORPTION) {
+            float way = light.kind == DIRECTIONAL_LIGHT ? 1e30 : length(arriving.ray);
+            response *= transmittance(same_side ? met.through.first : met.beyond.first, way);
         }
         response *= arriving.irradiance / (of_one ? light.probability : 1.0);
         bool seen = largest(response) > 0.0;

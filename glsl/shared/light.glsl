@@ -1,4 +1,4 @@
-// Lights. Include after scene.glsl.
+// Lights. Include after scene.glsl and media.glsl.
 
 #include "alias_table.glsl"
 
@@ -28,6 +28,7 @@ struct PunctualLight {
 };
 
 uniform usamplerBuffer Lights;
+uniform usamplerBuffer MediaOfLights;
 
 const uint LIGHT_TEXELS = 5u;
 
@@ -46,6 +47,16 @@ PunctualLight punctual_light_at(uint i) {
     }
     return PunctualLight(intensity_inner.rgb, position_outer.xyz, direction_range.xyz, intensity_inner.w,
                          position_outer.w, direction_range.w, extent);
+}
+
+// That a light is in.
+Media media_of_light(uint light) {
+    Media media = IN_VACUUM;
+    if (IMMERSED) {
+        uvec4 names = TEXEL_BITS(MediaOfLights, light);
+        media = Media(names.x, names.yzw);
+    }
+    return media;
 }
 
 bool is_punctual(uint kind) {

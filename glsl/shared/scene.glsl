@@ -10,6 +10,7 @@ layout(constant_id = 12) const bool PARTLY_CLEAR = false;
 layout(constant_id = 13) const bool ABSORPTION = false;
 layout(constant_id = 14) const bool PUNCTUAL_LIGHTS = false;
 layout(constant_id = 30) const bool SOFT_LIGHTS = false; // some of them have an extent
+layout(constant_id = 32) const bool IMMERSED = false; // paths start in dielectrics
 layout(constant_id = 15) const bool ENVIRONMENT = false;
 layout(constant_id = 16) const bool TEXTURED = false;
 layout(constant_id = 17) const bool ALPHA = false;

@@ -29,4 +29,5 @@ layout(std140) uniform Settings {
     uint padding0;
     uint padding1;
     uint padding2;
+    uvec4 camera_media;         // that the camera is in, see media.glsl
 } settings;

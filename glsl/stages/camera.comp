@@ -146,6 +146,9 @@ void main() {
     branch.depth = 0u;
     branch.ignored = NO_TRIANGLE;
     branch.media = IN_VACUUM;
+    if (IMMERSED) {
+        branch.media = Media(settings.camera_media.x, settings.camera_media.yzw);
+    }
     branch.wavelength = 0.0;
     branch.reflection_seen = false;
     branch.emission_seen = false;

@@ -76,6 +76,7 @@ struct Question {
     Sky sky;         // environment
     vec3 irradiance; // punctual: across the ray
     float probability; // of the light
+    uint light;
 };
 
 // Towards a light that u.x chooses, or of that source.
@@ -97,6 +98,7 @@ Question ask_light(vec3 position, vec3 normal, vec3 origin, uint of_source, vec3
     }
     Light light = light_at(chosen);
     question.kind = light.kind;
+    question.light = chosen;
     question.end = 1e30;
     question.ignored = NO_TRIANGLE;
     if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
@@ -227,6 +229,9 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     float of_light = 0.0; // density per solid angle
     if (punctual) {
         radiance = question.irradiance / question.probability;
+        if (IMMERSED) {
+            radiance *= transmittance(media_of_light(question.light).first, length(ray));
+        }
     } else if (ENVIRONMENT && (by_bsdf ? missed : question.kind == ENVIRONMENT_LIGHT)) {
         Sky sky = question.sky;
         if (by_bsdf) {
@@ -264,6 +269,10 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
         // A ray that met the light had its chance to pass it.
         float there = by_bsdf ? 1.0 : share_there(emitter);
         radiance = there * emitted_radiance(material, abs(cos_light));
+        if (IMMERSED) {
+            // What is between them is what the light is in.
+            radiance *= transmittance(media_of_light(emitter.light).first, sqrt(distance2));
+        }
         float probability = question.probability;
         if (by_bsdf) {
             probability = probability_of_light(position, shading_normal, of_source, emitter.light);

@@ -68,7 +68,7 @@ Path start(inout Random random) {
     path.flux = emission.flux;
     path.depth = 0u;
     path.ignored = emission.ignored;
-    path.media = IN_VACUUM;
+    path.media = emission.media;
     path.wavelength = 0.0;
     path.seen_directly = true;
     path.caustic = true;
@@ -169,6 +169,8 @@ void main() {
         if (met.hidden) {
             path.flux *= met.tint;
             path.media = met.beyond;
+            // No ray to a light passes it.
+            path.seen_directly = false;
             path.origin = origin_towards(surface, path.direction);
             path.ignored = surface.triangle;
             continue;

@@ -227,7 +227,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
         way: 0.0,
         depth: 0,
         ignored: None,
-        media: Media::VACUUM,
+        media: Media::of(settings.camera_media),
         wavelength: None,
         reflection_seen: false,
         emission_seen: false,

@@ -13,7 +13,7 @@ use super::gloss::Reflector;
 use super::intersect::{Hit, PlacedTriangle, Ray};
 use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
 use super::light_sources::{self, choose_light_for, choose_light_of, probability_for};
-use super::media::Media;
+use super::media::{Media, transmittance};
 use super::resolve::photons_of;
 use super::sampling::{cosine_direction, decode_direction, triangle_point};
 use super::surface::{DIELECTRIC, offset_origin, reach_of, surface_at, surface_of};
@@ -220,6 +220,8 @@ fn sample_direct(
         let density = sky.density * probability;
         response_to(Sky { density, ..sky }, direction)
     };
+    // What is between them is what the light is in.
+    let between = |light: usize, way: f64| transmittance(inputs, Media::of(inputs.scene.media_of_lights[light]), way);
     let environment = Environment::of(&inputs.scene.environment);
 
     let by_bsdf = way < q;
@@ -240,18 +242,20 @@ fn sample_direct(
         let met = Interface::new(inputs, hit, direction, Media::VACUUM, false, random);
         (met.surface, seen)
     } else {
-        let (light, probability) = match source {
+        let (index, probability) = match source {
             Some(source) => choose_light_of(inputs, source, first_digits),
             None if inputs.scene.features.many_sources => {
                 choose_light_for(inputs, position, shading_normal, [choice, first_digits])
             }
             None => {
-                let light = choose_light(&inputs.scene.lights, choice, [first_digits, second_digits]).light;
-                (light, light.probability.into())
+                let index = choose_light(&inputs.scene.lights, choice, [first_digits, second_digits]).index;
+                (index, inputs.scene.lights[index].probability.into())
             }
         };
+        let light = &inputs.scene.lights[index];
         if is_punctual(light) {
             let Arriving { ray, end, irradiance } = arriving_from(light, origin, DVec2::new(u, v));
+            let irradiance = irradiance * between(index, ray.length());
             return look_for(ray, end, None).map_or(nothing, |seen| {
                 seen.of(response(ray.normalize()) * irradiance / (probability * (1.0 - q)))
             });
@@ -286,7 +290,9 @@ fn sample_direct(
     if !emits(&emitter.material, cos_light > 0.0) || direction.dot(shading_normal) <= 0.0 || cos_light == 0.0 {
         return nothing;
     }
-    let radiance = there * emitted_radiance(&emitter.material, cos_light.abs());
+    let radiance = there
+        * emitted_radiance(&emitter.material, cos_light.abs())
+        * between(emitter.light as usize, to_light.length());
     let probability = probability_of(emitter.light);
     if source.is_some() && probability == 0.0 {
         return nothing;

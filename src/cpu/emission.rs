@@ -7,11 +7,13 @@ use glam::{DVec2, DVec3};
 use super::Inputs;
 use super::environment::Environment;
 use super::intersect::{PlacedTriangle, Ray};
-use super::light::{Choice, choose_light, emits, emitted_radiance, spot_falloff};
+use super::light::{choose_light, emits, emitted_radiance, spot_falloff};
+use super::media::Media;
 use super::sampling::{basis, cosine_direction, direction_in_cone, disc_point, triangle_point};
 use super::surface::{offset_origin, surface_at};
 use super::texture::{apply_textures, share_there};
 use super::vector::rgb;
+use crate::alias::Choice;
 use crate::emission::{Table, light_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
 use crate::random::Random;
@@ -28,6 +30,8 @@ pub(super) struct Emission {
     pub ignored: Option<PlacedTriangle>,
     /// Of a punctual light; 0 for one that reaches any distance.
     pub inverse_range: f64,
+    /// That it starts in.
+    pub media: Media,
 }
 
 /// A start, and what is to be known of it to tell which targets it meets.
@@ -49,7 +53,8 @@ pub(super) fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Emission {
     if let Some(table) = inputs.emission {
         return emit_aimed(inputs, table, u, w);
     }
-    let Choice { light, rest } = choose_light(&inputs.scene.lights, u[0], [w[0], w[2]]);
+    let Choice { index, rest } = choose_light(&inputs.scene.lights, u[0], [w[0], w[2]]);
+    let light = &inputs.scene.lights[index];
     let start = from_light(
         inputs,
         light,
@@ -58,7 +63,7 @@ pub(super) fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Emission {
         w[1],
         None,
     );
-    start.emission(light, 1.0 / f64::from(light.probability))
+    start.emission(inputs, index, 1.0 / f64::from(light.probability))
 }
 
 /// A sphere that is seen within less than this, sin² of its cone's angle, is worth aiming at from a matte surface.
@@ -98,8 +103,8 @@ fn emit_aimed(inputs: &Inputs<'_>, table: &Table, u: [f64; 4], w: [f64; 4]) -> E
     let [x, y, direction_x, direction_y, number] = table.coordinates(chosen);
     let cell = &table.cells[chosen.cell];
     let of_source = cell.first_light..cell.first_light + cell.lights;
-    let (light, probability) = light_of(&inputs.scene.lights, of_source, number);
-    let light = &inputs.scene.lights[light];
+    let (light_index, probability) = light_of(&inputs.scene.lights, of_source, number);
+    let light = &inputs.scene.lights[light_index];
     let index = (cell.target as usize).min(table.spheres.len());
     let target = table.spheres.get(index).copied().map(Sphere::of);
     let (place, direction) = (DVec2::new(x, y), DVec2::new(direction_x, direction_y));
@@ -118,16 +123,17 @@ fn emit_aimed(inputs: &Inputs<'_>, table: &Table, u: [f64; 4], w: [f64; 4]) -> E
     } else {
         0.0
     };
-    start.emission(light, weight)
+    start.emission(inputs, light_index, weight)
 }
 
 impl Start {
-    fn emission(&self, light: &Light, weight: f64) -> Emission {
+    fn emission(&self, inputs: &Inputs<'_>, light: usize, weight: f64) -> Emission {
         Emission {
+            media: Media::of(inputs.scene.media_of_lights[light]),
             ray: self.ray,
             flux: self.flux * weight,
             ignored: self.ignored,
-            inverse_range: light.inverse_range.into(),
+            inverse_range: inputs.scene.lights[light].inverse_range.into(),
         }
     }
 }

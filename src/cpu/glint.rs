@@ -32,9 +32,9 @@ pub(super) fn glint(
     let [u, first_digits, second_digits, x, y] = [0, 1, 2, 3, 4].map(|number| random.number_of([number, GLINT]));
     let place = DVec2::new(x, y);
     let lights = &inputs.scene.lights;
-    let chosen = choose_light(lights, u, [first_digits, second_digits]).light;
+    let chosen = choose_light(lights, u, [first_digits, second_digits]).index;
     let of_one = inputs.settings.slots_per_pixel == 1;
-    let asked = if of_one { std::slice::from_ref(chosen) } else { lights };
+    let asked = if of_one { &lights[chosen..=chosen] } else { lights };
     let boundary = Reflector {
         diffuse: DVec3::ZERO,
         ..*reflector
@@ -48,19 +48,18 @@ pub(super) fn glint(
         let cosine = direction.dot(facing.shading_normal);
         let same_side = direction.dot(facing.geometric_normal) > 0.0;
         let response = if material.surface == DIELECTRIC {
-            let medium = if same_side { met.through } else { met.beyond };
-            let is_far = light.kind == DIRECTIONAL_LIGHT;
-            let way = if is_far { FAR } else { ray.length() };
             glass_response(facing, incoming, direction, material, met.outside)
                 * if same_side { DVec3::ONE } else { met.tint }
-                * transmittance(inputs, medium, way)
         } else if same_side && cosine > 0.0 {
             boundary.brdf(facing.shading_normal, -incoming, direction) * cosine
         } else {
             DVec3::ZERO
         };
         let probability = if of_one { f64::from(light.probability) } else { 1.0 };
-        let response = response * irradiance / probability;
+        let medium = if same_side { met.through } else { met.beyond };
+        let is_far = light.kind == DIRECTIONAL_LIGHT;
+        let way = if is_far { FAR } else { ray.length() };
+        let response = response * irradiance * transmittance(inputs, medium, way) / probability;
         let ray = Ray { origin, direction: ray };
         if response.max_element() <= 0.0 || nearest_visible(inputs, ray, end, None, random).is_some() {
             return DVec3::ZERO;

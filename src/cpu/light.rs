@@ -10,22 +10,12 @@ use super::vector::rgb;
 use crate::alias::{self, AliasCell};
 use crate::layout::{BACK_EMITS, DIRECTIONAL_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT};
 
-/// A light, and what is left of the number that chose it, uniform in [0, 1].
-pub(super) struct Choice<'a> {
-    pub light: &'a Light,
-    pub rest: f64,
-}
-
 /// By the alias method, with the digits of `u` in [0, 1) and of two more numbers below it.
-pub(super) fn choose_light(lights: &[Light], u: f64, digits: [f64; 2]) -> Choice<'_> {
-    let alias::Choice { index, rest } = alias::choose(lights.len(), u, digits, |cell| AliasCell {
+pub(super) fn choose_light(lights: &[Light], u: f64, digits: [f64; 2]) -> alias::Choice {
+    alias::choose(lights.len(), u, digits, |cell| AliasCell {
         accept: lights[cell].accept,
         alias: lights[cell].alias,
-    });
-    Choice {
-        light: &lights[index],
-        rest,
-    }
+    })
 }
 
 /// Whether light leaves on the triangle's front, or on its back.
@@ -172,7 +162,7 @@ mod tests {
                 let second = ((u * steps - first) * steps).floor();
                 let third = ((u * steps - first) * steps - second) * steps;
                 let choice = choose_light(&lights, first / steps, [second / steps, third.floor() / steps]);
-                choice.light.triangle == wanted
+                lights[choice.index].triangle == wanted
             });
             2.0 * width * inside.count() as f64 / f64::from(count)
         };
@@ -197,8 +187,8 @@ mod tests {
         let mut rests = 0.0;
         for path in 0..count {
             let [u, v, w, _] = Random::new(PathKind::Photon, path, 0, 0).next4();
-            let Choice { light, rest } = choose_light(&lights, u, [v, w]);
-            chosen[light.triangle as usize] += 1.0;
+            let alias::Choice { index, rest } = choose_light(&lights, u, [v, w]);
+            chosen[index] += 1.0;
             rests += rest;
         }
         let n = f64::from(count);

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::Inputs;
 use super::vector::rgb;
 use crate::emission::light_of;
-use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, LightSource, TRIANGLE_LIGHT};
+use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, LightSource, TRIANGLE_LIGHT};
 
 /// The part of all choices among those that can bring anything that is made without knowing the point.
 const WITHOUT_POINT: f64 = 0.1;
@@ -78,12 +78,12 @@ fn sources<'a>(
 }
 
 /// A light for a point, and its probability: `u` chooses the source, `u_light` the light.
-pub(super) fn choose_light_for<'a>(
-    inputs: &Inputs<'a>,
+pub(super) fn choose_light_for(
+    inputs: &Inputs<'_>,
     position: DVec3,
     normal: DVec3,
     [u, u_light]: [f64; 2],
-) -> (&'a Light, f64) {
+) -> (usize, f64) {
     let mut sum = 0.0;
     let mut chosen = None;
     for (source, probability) in sources(inputs, position, normal).filter(|(_, probability)| *probability > 0.0) {
@@ -100,9 +100,8 @@ pub(super) fn choose_light_for<'a>(
 }
 
 /// A light of a source, and its probability within that.
-pub(super) fn choose_light_of<'a>(inputs: &Inputs<'a>, source: &LightSource, u_light: f64) -> (&'a Light, f64) {
-    let (light, probability) = light_of(&inputs.scene.lights, range_of(source), u_light);
-    (&inputs.scene.lights[light], probability)
+pub(super) fn choose_light_of(inputs: &Inputs<'_>, source: &LightSource, u_light: f64) -> (usize, f64) {
+    light_of(&inputs.scene.lights, range_of(source), u_light)
 }
 
 /// The lights of a source.

@@ -19,6 +19,11 @@ pub(super) struct Media([Medium; 4]);
 impl Media {
     pub const VACUUM: Self = Self([VACUUM; 4]);
 
+    /// Those of these names, in order.
+    pub fn of(names: [Medium; 4]) -> Self {
+        Self(names)
+    }
+
     /// What is there.
     pub fn first(&self) -> Medium {
         self.0[0]

@@ -104,7 +104,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         ray: emission.ray,
         flux: emission.flux,
         ignored: emission.ignored,
-        media: Media::VACUUM,
+        media: emission.media,
         wavelength: None,
         seen_directly: true,
         caustic: true,
@@ -132,6 +132,8 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         if met.hidden {
             path.flux *= met.tint;
             path.media = met.beyond;
+            // No ray to a light passes it.
+            path.seen_directly = false;
             path.ray.origin = surface.origin_towards(incoming);
             path.ignored = Some(surface.triangle);
             continue;

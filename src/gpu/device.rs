@@ -196,6 +196,7 @@ fn advice(id: BufferId) -> &'static str {
         | BufferId::Lights
         | BufferId::NearLights
         | BufferId::LightSources
+        | BufferId::MediaOfLights
         | BufferId::ObjectGrids => "make the scene smaller, or use another --device or --backend cpu",
         _ => "try fewer --photons or a smaller --resolution",
     }

@@ -77,7 +77,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
 }
 
 /// The buffers that hold the scene.
-pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 13] {
+pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 14] {
     [
         (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
         (BufferId::HavelTriangles, bytemuck::cast_slice(&scene.havel_triangles)),
@@ -93,6 +93,7 @@ pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 13] {
         (BufferId::Lights, bytemuck::cast_slice(&scene.lights)),
         (BufferId::NearLights, bytemuck::cast_slice(&scene.near_lights)),
         (BufferId::LightSources, bytemuck::cast_slice(&scene.light_sources)),
+        (BufferId::MediaOfLights, bytemuck::cast_slice(&scene.media_of_lights)),
         (BufferId::Environment, bytemuck::cast_slice(&scene.environment)),
         (BufferId::ObjectGrids, bytemuck::cast_slice(&scene.object_grids)),
     ]

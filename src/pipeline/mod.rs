@@ -19,7 +19,7 @@ use crate::gpu::Device;
 use crate::layout::{Settings, StatusCounters};
 use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
-use crate::scene::{Camera, PackedScene, SceneFeatures};
+use crate::scene::{Camera, IN_VACUUM, PackedScene, SceneFeatures};
 use crate::stage::{BufferId, SEQUENCE_FILMS};
 use stages::{method_stages, reporting};
 
@@ -100,6 +100,7 @@ impl Renderer {
             limits,
             settings,
             features: SceneFeatures {
+                immersed: scene.features.immersed || settings.camera_media != IN_VACUUM,
                 lens: scene.features.lens || camera.lens.is_some(),
                 ..scene.features
             },

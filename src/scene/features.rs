@@ -62,6 +62,8 @@ features! {
     contact: "CONTACT",
     /// Dielectrics inside of others, or overlapping them.
     nested: "NESTED",
+    /// Paths that start in a dielectric.
+    immersed: "IMMERSED",
     /// Faces in one place.
     coincidence: "COINCIDENCE",
     /// Lights that are points or directions.

@@ -25,6 +25,7 @@ mod geometry;
 mod glb;
 mod graph;
 mod image;
+mod immersion;
 mod instance;
 mod instancing;
 mod json;
@@ -57,6 +58,8 @@ mod variants;
 pub use budget::MEMORY_LIMIT;
 pub use features::SceneFeatures;
 pub(crate) use features::{DIELECTRIC, GLOSSY, MIRROR};
+pub(crate) use immersion::IN_VACUUM;
+pub use immersion::Immersion;
 pub use light_sources::MOST_SOURCES;
 #[cfg(test)]
 pub(crate) use light_table::set_alias_table;

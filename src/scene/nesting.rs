@@ -21,6 +21,12 @@ pub(super) struct Nesting {
     pub overlaps: bool,
 }
 
+/// Whether a material is a dielectric with an inside.
+pub(super) fn is_solid(scene: &Scene, material: u32) -> bool {
+    let surface = scene.materials[material as usize].surface;
+    matches!(surface, Surface::Dielectric(glass) if !glass.thin)
+}
+
 struct Solid {
     object: usize,
     low: Vec3,
@@ -34,13 +40,9 @@ impl Nesting {
     /// # Errors
     /// A text, if solids overlap and there are more materials than names of media hold.
     pub(super) fn of(scene: &Scene) -> Result<Self, String> {
-        let is_solid = |material: u32| {
-            let surface = scene.materials[material as usize].surface;
-            matches!(surface, Surface::Dielectric(glass) if !glass.thin)
-        };
         let objects = scene.objects.iter().enumerate();
         let mut solids: Vec<Solid> = objects
-            .filter(|(_, object)| is_solid(object.material))
+            .filter(|(_, object)| is_solid(scene, object.material))
             .map(|(object, _)| Solid::of(scene, object))
             .collect();
         let any_solid = !solids.is_empty();

@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::{DVec3, Vec3, Vec4};
 
 use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
+use super::immersion::{IN_VACUUM, Immersion};
 use super::material::normal_reflectance;
 use super::near_lights::NearLights;
 use super::nesting::Nesting;
@@ -69,6 +70,10 @@ pub struct PackedScene {
     pub near_lights: Vec<[f32; 4]>,
     /// Bounds of [`PackedScene::sources`].
     pub light_sources: Vec<LightSource>,
+    /// What a point is in.
+    pub immersion: Immersion,
+    /// Of each light, the media that it is in: see [`Immersion::media_at`].
+    pub media_of_lights: Vec<[u32; 4]>,
 }
 
 impl PackedScene {
@@ -142,6 +147,9 @@ impl PackedScene {
             let material = shading_triangles[triangle as usize].material;
             materials[material as usize].flags & BACK_EMITS != 0
         };
+        let immersion = Immersion::new(scene, &nesting);
+        let media_of_lights = immersion.of_lights(&light_table.lights, &corners);
+        features.immersed = media_of_lights.iter().any(|media| *media != IN_VACUUM);
         let light_sources = light_bounds::light_sources(&light_table, &corners, two_sided, scene.environment.as_ref());
         Ok(Self {
             power: light_table.power,
@@ -162,6 +170,8 @@ impl PackedScene {
             bsdf_sampling: near_lights.bsdf_sampling(area_of_all(scene)),
             near_lights: near_lights.spheres(),
             light_sources,
+            immersion,
+            media_of_lights,
             materials,
             lights: light_table.lights,
             sources: light_table.sources,
