@@ -40,6 +40,8 @@ mod instancing;
 mod lights;
 #[path = "scene/materials.rs"]
 mod materials;
+#[path = "scene/memory.rs"]
+mod memory;
 #[path = "scene/sharing.rs"]
 mod sharing;
 #[path = "scene/solid.rs"]

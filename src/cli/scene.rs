@@ -54,8 +54,8 @@ pub struct SceneArguments {
     /// Apply the scene's animations at this time, in seconds [default: everything at rest].
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     frame_time: Option<f64>,
-    /// Memory that the scene may take as it is read: buffers, images, geometry. A small file can ask for any amount
-    /// [default: 2].
+    /// Memory that the scene may take as it is read, in all: buffers, geometry, images, environment. A small file can ask for any
+    /// amount [default: 2].
     #[arg(long, value_name = "GIB", allow_negative_numbers = true, value_parser = positive)]
     memory_limit: Option<f64>,
     /// Materials of this variant (ppm-vk inspect lists a scene's) [default: each mesh's own].

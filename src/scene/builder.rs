@@ -31,6 +31,18 @@ pub(super) struct Geometry {
     pub dropped_triangles: usize,
 }
 
+impl Geometry {
+    /// Bytes that it takes.
+    pub(super) fn bytes(&self) -> u64 {
+        let sizes = [
+            size_of_val(&self.positions[..]) + size_of_val(&self.normals[..]),
+            size_of_val(&self.texcoords[..]) + size_of_val(&self.colors[..]) + size_of_val(&self.tangents[..]),
+            size_of_val(&self.triangles[..]),
+        ];
+        sizes.iter().sum::<usize>() as u64
+    }
+}
+
 /// Grows a [`Geometry`] by one instance after another.
 pub(super) struct Builder {
     /// What there is so far.
@@ -77,20 +89,6 @@ impl Builder {
 
     /// Bytes of what there is, and of an instance beside it at the least.
     pub(super) fn bytes_with(&self, instance: &Instance<'_>) -> u64 {
-        let Geometry {
-            positions,
-            normals,
-            texcoords,
-            colors,
-            tangents,
-            triangles,
-            ..
-        } = &self.geometry;
-        let sizes = [
-            size_of_val(&positions[..]) + size_of_val(&normals[..]),
-            size_of_val(&texcoords[..]) + size_of_val(&colors[..]) + size_of_val(&tangents[..]),
-            size_of_val(&triangles[..]),
-        ];
         let more = if self.shared.contains_key(&instance.key()) {
             0
         } else {
@@ -98,7 +96,7 @@ impl Builder {
             let used = vertices.min(3 * triangles);
             size_of::<u32>() * vertices + 2 * size_of::<Vec3>() * used + size_of::<Triangle>() * triangles
         };
-        (sizes.iter().sum::<usize>() + more) as u64
+        self.geometry.bytes() + more as u64
     }
 
     /// Adds an instance as an object, unless nothing of it is left. Returns how many triangles were dropped.

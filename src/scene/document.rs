@@ -61,9 +61,8 @@ pub(super) struct Document {
 const QUANTIZATION: &str = "KHR_mesh_quantization";
 
 impl Document {
-    /// Reads the file at `path` and all buffers that it refers to, for a scene that may take so many bytes.
-    pub(super) fn read(path: &Path, memory_limit: u64, warnings: &mut Warnings) -> Check<Self> {
-        let budget = Budget::new(memory_limit);
+    /// Reads the file at `path` and all buffers that it refers to, for a scene that may take what is left of the budget.
+    pub(super) fn read(path: &Path, budget: Budget, warnings: &mut Warnings) -> Check<Self> {
         let mut bytes = read_file(path, &budget)?;
         let (json, binary) = if bytes.starts_with(glb::MAGIC) {
             glb::split(&bytes)?

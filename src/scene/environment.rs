@@ -115,6 +115,11 @@ impl Environment {
         Ok(Self { image, ..self })
     }
 
+    /// Bytes that it takes.
+    pub(super) fn bytes(&self) -> u64 {
+        size_of_val(self.image.pixels()) as u64
+    }
+
     /// What was done to the picture to have it rendered, one line each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();

@@ -156,6 +156,7 @@ pub(super) fn assemble(document: &Document, instances: &[Instance<'_>], warnings
     }
     builder.complete_attributes();
     let geometry = builder.geometry;
+    document.budget.take(geometry.bytes(), "what its meshes show")?;
     // Triangles to be shared may be left that no object shows.
     if geometry.objects.is_empty() {
         return Err(

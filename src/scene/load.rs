@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::animation::Pose;
-use super::budget::MEMORY_LIMIT;
+use super::budget::{Budget, MEMORY_LIMIT};
 use super::buffer::referred_files;
 use super::diagnostic::{Check, Warnings, quote, shorten};
 use super::document::{Document, SUPPORTED_EXTENSIONS};
@@ -23,7 +23,8 @@ pub struct LoadOptions {
     pub frame_time: Option<f64>,
     /// What surrounds the scene. `None`: nothing, or white light where the scene has no light at all, which is said.
     pub environment: Option<Environment>,
-    /// Bytes that the scene may take as it is read: buffers, images, geometry. `None`: [`MEMORY_LIMIT`].
+    /// Bytes that the scene may take as it is read, in all: buffers, what was compressed in them, geometry, images, environment.
+    /// `None`: [`MEMORY_LIMIT`].
     pub memory_limit: Option<u64>,
     /// The material variant (KHR_materials_variants) with that name. `None`: primitives have their own materials.
     pub variant: Option<String>,
@@ -65,8 +66,11 @@ impl Scene {
 fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
     let mut warnings = Warnings::default();
     let mut notes = Vec::new();
-    let limit = options.memory_limit.unwrap_or(MEMORY_LIMIT);
-    let mut document = Document::read(path, limit, &mut warnings)?;
+    let budget = Budget::new(options.memory_limit.unwrap_or(MEMORY_LIMIT));
+    if let Some(environment) = &options.environment {
+        budget.take(environment.bytes(), "the environment")?;
+    }
+    let mut document = Document::read(path, budget, &mut warnings)?;
     let variants = variants::names(&document.root)?;
     if let Some(wanted) = &options.variant {
         variants::choose(&mut document.root, &variants, wanted)?;

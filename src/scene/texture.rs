@@ -163,7 +163,7 @@ impl TextureReader<'_> {
             }
             match Pixels::read(self.document, image, self.folder) {
                 Ok(pixels) => {
-                    let added = Some(self.add(&pixels));
+                    let added = Some(self.add(&pixels)?);
                     self.images.insert(source, added);
                     return Ok(added);
                 }
@@ -182,12 +182,23 @@ impl TextureReader<'_> {
     }
 
     /// Adds an image; returns its first texel and its size.
-    fn add(&mut self, pixels: &Pixels) -> [u32; 2] {
+    fn add(&mut self, pixels: &Pixels) -> Check<[u32; 2]> {
         let texels = &mut self.textures.texels;
-        let first = texels.len() as u32;
+        let first = first_texel(texels.len() as u64, pixels.rgba.len() as u64)?;
         texels.extend(pixels.rgba.iter().map(|rgba| u32::from_le_bytes(*rgba)));
-        [first, pixels.width | pixels.height << 16]
+        Ok([first, pixels.width | pixels.height << 16])
     }
+}
+
+/// Where an image of so many texels begins after those of the others. Kernels count texels in 32 bits.
+fn first_texel(before: u64, count: u64) -> Check<u32> {
+    let most = u64::from(u32::MAX);
+    let fits = before.checked_add(count).is_some_and(|all| all <= most);
+    u32::try_from(before).ok().filter(|_| fits).ok_or_else(|| {
+        format!(
+            "its images have {before} texels and {count} more, of which {most} at the most are read; make them smaller"
+        )
+    })
 }
 
 /// The images that a texture names, each to stand for those before it: what extensions name is better than what is there for
@@ -319,6 +330,16 @@ mod tests {
         let blended = checker(0);
         assert_eq!(at(&blended, 0.25, 0.25), [0.0, 0.0, 0.0, 1.0]);
         assert_eq!(at(&blended, 0.5, 0.5), [0.5, 0.5, 0.25, 1.0]);
+    }
+
+    #[test]
+    fn images_beyond_what_32_bits_count_are_refused() {
+        assert_eq!(first_texel(0, 1), Ok(0));
+        assert_eq!(first_texel((1 << 32) - 5, 4), Ok(u32::MAX - 4));
+        for (before, count) in [((1 << 32) - 5, 5), (1 << 32, 1), (1, u64::MAX), (u64::MAX, 1)] {
+            let error = first_texel(before, count).expect_err("more than 32 bits count");
+            assert!(error.contains("4294967295 at the most"), "{error}");
+        }
     }
 
     #[test]

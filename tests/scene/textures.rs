@@ -262,7 +262,7 @@ fn alpha_is_as_the_file_says() {
 }
 
 /// A black PNG in the room's folder, of which the room's floor has so many copies as textures.
-fn with_images(count: usize, side: u32) -> Fixture {
+pub fn with_images(count: usize, side: u32) -> Fixture {
     let mut room = Fixture::room();
     let mut png = std::io::Cursor::new(Vec::new());
     image::RgbImage::new(side, side)
