@@ -267,8 +267,8 @@ fn values_that_mean_nothing_are_refused_by_the_name_of_their_flag() {
         ("--light-radius", "inf"),
         ("--shift", "0.5"),
         ("--shift", "nan,0"),
-        ("--environment-rotation", "90"),
-        ("--environment-strength", "2"),
+        ("--environment-rotation", "nan"),
+        ("--environment-strength", "0"),
     ] {
         let output = ppm_vk(folder.path(), &["--scene", wall, flag, value]);
         assert_eq!(output.status.code(), Some(2), "{flag} {value}: {}", stderr(&output));
@@ -279,6 +279,42 @@ fn values_that_mean_nothing_are_refused_by_the_name_of_their_flag() {
         let arguments = [&["--scene", wall, "--environment", "1,1,1"][..], &flags].concat();
         let output = ppm_vk(folder.path(), &arguments);
         assert_eq!(output.status.code(), Some(2), "{flags:?}: {}", stderr(&output));
+    }
+}
+
+/// Also of the light that a scene without any is given. Where nothing surrounds a scene, one line says that flags do nothing.
+#[test]
+fn an_environment_is_scaled_and_rotated_where_there_is_one() {
+    let folder = TempDir::new().expect("folder");
+    let wall = half_a_wall(folder.path());
+    let flags = ["--environment-rotation", "90", "--environment-strength", "2"];
+    let picture = |scene: &Path, flags: &[&str]| render(folder.path(), scene, flags);
+    let mean = |image: &Image| ppm_vk::metrics::mean(image)[1];
+    let without_effect = |said: &str| said.lines().filter(|line| line.contains("without effect")).count();
+
+    let ((once, _), (twice, said)) = (picture(&wall, &[]), picture(&wall, &flags[2..]));
+    assert!(
+        (mean(&twice) / mean(&once) - 2.0).abs() < 1e-5,
+        "{}, {}",
+        mean(&once),
+        mean(&twice)
+    );
+    assert_eq!(without_effect(&said), 0, "{said}");
+
+    let lamp = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/lights.gltf");
+    let (plain, said) = picture(&lamp, &["--environment-rotation", "0", "--environment-strength", "1"]);
+    assert_eq!(without_effect(&said), 0, "{said}");
+    for (flags, words) in [
+        (
+            &flags[..],
+            "note: --environment-rotation and --environment-strength are without effect",
+        ),
+        (&flags[..2], "note: --environment-rotation is without effect"),
+        (&flags[2..], "note: --environment-strength is without effect"),
+    ] {
+        let (image, said) = picture(&lamp, flags);
+        assert!(image == plain, "{flags:?}: other bits");
+        assert!(without_effect(&said) == 1 && said.contains(words), "{flags:?}: {said}");
     }
 }
 

@@ -22,7 +22,6 @@ pub struct SceneArguments {
         long,
         value_name = "DEG",
         default_value_t = 0.0,
-        requires = "environment",
         allow_negative_numbers = true,
         value_parser = finite
     )]
@@ -32,7 +31,6 @@ pub struct SceneArguments {
         long,
         value_name = "S",
         default_value_t = 1.0,
-        requires = "environment",
         allow_negative_numbers = true,
         value_parser = positive
     )]
@@ -95,12 +93,6 @@ impl SceneArguments {
             Some(EnvironmentChoice::Constant(radiance)) => Some(Environment::constant((*radiance).into())),
             Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture, memory_limit)?),
         };
-        let placed = |environment: Environment| {
-            let scaled = environment.scaled(self.environment_strength);
-            let scaled = scaled.map_err(|what| Error::Config(format!("--environment-strength: {what}")));
-            scaled.map(|environment| environment.rotated(self.environment_rotation))
-        };
-        let environment = environment.map(placed).transpose()?;
         let options = LoadOptions {
             frame_time: self.frame_time,
             environment,
@@ -112,7 +104,35 @@ impl SceneArguments {
             sun_angle: self.sun_angle,
             light_radius: self.light_radius,
         };
-        Ok(while_showing(READING, quiet, || Scene::load_with(path, options))?)
+        let mut scene = while_showing(READING, quiet, || Scene::load_with(path, options))?;
+        self.place_environment(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Scales and rotates what surrounds the scene, whether it was asked for or is there because nothing else shines.
+    fn place_environment(&self, scene: &mut Scene) -> Result<()> {
+        let is_asked = [self.environment_rotation != 0.0, self.environment_strength != 1.0];
+        if let Some(environment) = scene.environment.take() {
+            let scaled = environment.scaled(self.environment_strength);
+            let scaled = scaled.map_err(|what| Error::Config(format!("--environment-strength: {what}")))?;
+            scene.environment = Some(scaled.rotated(self.environment_rotation));
+        } else if is_asked != [false; 2] {
+            let flags = ["--environment-rotation", "--environment-strength"];
+            let flags: Vec<&str> = flags
+                .into_iter()
+                .zip(is_asked)
+                .filter(|(_, is)| *is)
+                .map(|(flag, _)| flag)
+                .collect();
+            scene.notes.push(format!(
+                "{} without effect: nothing surrounds the scene (--environment FILE or R,G,B)",
+                match flags[..] {
+                    [one] => format!("{one} is"),
+                    _ => format!("{} are", flags.join(" and ")),
+                }
+            ));
+        }
+        Ok(())
     }
 }
 
