@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use gltf::json::Root;
 use serde_json::{Number, Value};
 
+use super::breaches;
 use super::budget::Budget;
 use super::diagnostic::{Check, Warnings, damaged, quote};
 
@@ -38,6 +39,7 @@ pub(super) fn read(json: &[u8], warnings: &mut Warnings) -> Check<Value> {
     let mut value: Value = serde_json::from_slice(json).map_err(|error| {
         format!("isn't glTF: neither .glb nor JSON ({error}); give a .gltf or .glb file, or export it again")
     })?;
+    breaches::warn(&value, warnings);
     normalise(&mut value);
     normalise_colors(&mut value, warnings);
     Ok(value)

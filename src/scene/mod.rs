@@ -6,6 +6,7 @@
 mod accessor;
 mod animation;
 mod attributes;
+mod breaches;
 mod budget;
 mod buffer;
 mod builder;
