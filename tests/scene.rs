@@ -12,8 +12,6 @@ mod assets;
 mod attributes;
 #[path = "scene/cameras.rs"]
 mod cameras;
-#[path = "scene/cases.rs"]
-mod cases;
 #[path = "scene/choices.rs"]
 mod choices;
 #[path = "scene/compressed.rs"]

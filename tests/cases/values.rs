@@ -1,0 +1,191 @@
+//! Cases about light: the values that are known in closed form, or by another renderer's picture.
+//!
+//! Tolerances are five standard deviations, measured over other seeds, beside what the radius may blur: a false alarm is rarer than 1 in
+//! 10⁶ for each value.
+
+use ppm_vk::film::read_exr;
+
+use super::files::{Seen, assert_refused, folder, name, render, scenes};
+
+/// What a scene is seen as in the middle of the picture, where a block in the middle of it hides all else.
+fn is_middle(x: f64, y: f64) -> bool {
+    x.abs().max(y.abs()) < 0.35
+}
+
+/// Where no block hides the plate.
+fn is_beside(x: f64, y: f64) -> bool {
+    x.abs().max(y.abs()) > 0.75
+}
+
+fn all(_: f64, _: f64) -> bool {
+    true
+}
+
+/// The part of a value that the first radius may cost or add.
+const BIAS_OF_RADIUS: f64 = 0.01;
+
+/// 100 cd at 2 m, reflectance 0.8.
+const WHITE_FACE: f64 = 0.8 * 25.0 / std::f64::consts::PI;
+
+#[test]
+fn of_doubled_faces_the_one_in_front_is_seen_in_either_order() {
+    let Some(folder) = folder("01") else { return };
+    for scene in scenes(&folder, 4) {
+        for accel in ["bvh", "brute"] {
+            let sampled = render(&scene, 9, 4, 2000, &["--accel", accel]);
+            // The pixel in the middle is so wide that the lamp is farther away at its edges by .04 %.
+            let middle = |x: f64, y: f64| x.abs().max(y.abs()) < 0.1;
+            sampled.assert_mean(WHITE_FACE, 0.001 * WHITE_FACE, "the middle", middle);
+            if accel == "bvh" {
+                let photons = render(&scene, 9, 4, 50_000, &["--direct", "photons"]);
+                photons.assert_mean(
+                    sampled.mean(all)[0],
+                    BIAS_OF_RADIUS * WHITE_FACE + 5.0 * 0.015,
+                    "by photons",
+                    all,
+                );
+            }
+        }
+    }
+}
+
+/// The sun, or whatever has no number, is missing, and everything else is right.
+#[test]
+fn an_environment_with_what_is_no_radiance_gives_a_finite_picture_and_a_word() {
+    let Some(folder) = folder("04") else { return };
+    let plain = folder.join("plain.gltf");
+    for (file, expected) in [
+        ("inf.exr", Some(0.5)),
+        ("nan.exr", Some(0.5)),
+        ("negative.exr", Some(0.5)),
+        ("max-half.exr", None),
+    ] {
+        let picture = folder.join(file);
+        let seen = render(&plain, 8, 16, 512, &["--environment", picture.to_str().expect("UTF-8")]);
+        match expected {
+            // One pixel of 1,024 is dark.
+            Some(expected) => seen.assert_mean(expected, 0.03, file, all),
+            None => assert!(seen.mean(all)[0] > 1.0, "{file}: the sun is missing; {}", seen.said),
+        }
+        let is_said = seen
+            .warnings()
+            .iter()
+            .any(|line| line.contains("3 values of the environment"));
+        assert_eq!(is_said, expected.is_some(), "{file}: {}", seen.said);
+    }
+}
+
+#[test]
+fn a_dome_that_shines_lights_what_lies_under_an_invisible_block() {
+    let Some(folder) = folder("10") else { return };
+    for scene in scenes(&folder, 8) {
+        match &*name(&scene) {
+            "no-dome-sun.gltf" => render(&scene, 16, 1, 500, &[]).assert_mean(0.5, 1e-4, "all", all),
+            // What is unlit is matter all the same, and this shuts out the sun.
+            "unlit-dome-sun.gltf" => {
+                let seen = render(&scene, 16, 1, 500, &[]);
+                seen.assert_mean(0.0, 0.0, "all", all);
+                assert!(seen.warnings()[0].contains("black"), "{}", seen.said);
+            }
+            _ => assert_half(&render(&scene, 16, 8, 20_000, &[]), 0.009, 0.004),
+        }
+    }
+}
+
+#[test]
+fn the_sun_lights_what_lies_under_an_invisible_block_on_a_ground_of_any_size() {
+    let Some(folder) = folder("21") else { return };
+    for scene in scenes(&folder, 4) {
+        // Beside the block there is no noise.
+        assert_half(&render(&scene, 16, 8, 20_000, &[]), 0.005, 0.0);
+    }
+}
+
+/// ½ in the middle and beside it, with such standard deviations.
+#[track_caller]
+fn assert_half(seen: &Seen, middle: f64, beside: f64) {
+    seen.assert_mean(0.5, 5.0 * middle + BIAS_OF_RADIUS * 0.5, "the middle", is_middle);
+    seen.assert_mean(0.5, 5.0 * beside + BIAS_OF_RADIUS * 0.5, "beside", is_beside);
+    assert!(seen.warnings().is_empty(), "{}", seen.said);
+}
+
+#[test]
+fn a_pane_reflects_as_one_and_two_panes_as_two() {
+    // Of a wall of radiance 10, at right angles.
+    let once = 0.04;
+    let twice = once * (1.0 + 0.96f64.powi(2) / (1.0 - once * once));
+    let solid = 2.0 * once / (1.0 + once);
+    let Some(folder) = folder("22") else { return };
+    for scene in scenes(&folder, 6) {
+        let (expected, deviation) = match &*name(&scene) {
+            "gap.gltf" => (twice, 0.008),
+            "solid.gltf" => (solid, 0.008),
+            // Faces in one place are one pane (docs/files.md).
+            _ => (once, 0.0),
+        };
+        let seen = render(&scene, 16, 8, 2000, &[]);
+        // Away from the middle the angle is up to 8°, where 0.1 % more are reflected.
+        seen.assert_mean(10.0 * expected, 5.0 * deviation + 0.001 * 10.0 * expected, "all", all);
+    }
+}
+
+/// The references have a noise of .1 % of their mean. That of the largest terrain is no measure for places: its patch of sun lies
+/// elsewhere than in the next smaller one's, from which the same is seen.
+#[test]
+fn a_room_with_a_window_is_as_a_path_tracer_has_it_whatever_lies_outside() {
+    let Some(folder) = folder("32") else { return };
+    for scene in scenes(&folder, 3) {
+        let reference = name(&scene).replace("terrain", "ref").replace(".gltf", ".exr");
+        let reference = Seen::of(read_exr(&folder.join(&reference)).expect(&reference), &reference);
+        let seen = render(&scene, 48, 8, 50_000, &[]);
+        let assert_alike = |deviation: f64, place: &str, is_asked: fn(f64, f64) -> bool| {
+            let expected = reference.mean(is_asked)[0];
+            seen.assert_mean(expected, 5.0 * deviation + BIAS_OF_RADIUS * expected, place, is_asked);
+        };
+        assert_alike(0.0075, "all", all);
+        if !name(&scene).contains("1000") {
+            assert_alike(0.006, "the left half", |x, _| x < 0.0);
+            assert_alike(0.008, "the right half", |x, _| x > 0.0);
+        }
+    }
+}
+
+#[test]
+fn where_a_label_is_clear_the_wall_below_it_is_seen_in_either_order() {
+    let Some(folder) = folder("33") else { return };
+    for scene in scenes(&folder, 8) {
+        for accel in ["bvh", "brute"] {
+            let seen = render(&scene, 16, 1, 500, &["--accel", accel]);
+            // The light has no noise.
+            seen.assert_mean(0.5, 1e-4, accel, |x, _| x > 0.0);
+        }
+    }
+}
+
+#[test]
+fn glass_that_would_amplify_light_is_cut_to_what_is_clear_with_a_warning() {
+    let Some(folder) = folder("faults") else { return };
+    let clear = render(&folder.join("att-one.gltf"), 16, 2, 4000, &[]);
+    assert!(clear.warnings().is_empty(), "{}", clear.said);
+    for file in ["att-1p5.gltf", "att-5123.gltf"] {
+        let cut = render(&folder.join(file), 16, 2, 4000, &[]);
+        let warnings = cut.warnings();
+        assert!(
+            warnings.len() == 1 && warnings[0].contains("attenuationColor") && warnings[0].contains("cut"),
+            "{file}: {}",
+            cut.said
+        );
+        assert!(
+            cut.image == clear.image,
+            "{file}: other bits than of 1, where it is cut to that"
+        );
+    }
+}
+
+#[test]
+fn an_instanced_mesh_whose_triangles_all_vanish_is_refused() {
+    let Some(folder) = folder("faults") else { return };
+    for more in [&[][..], &["--backend", "cpu"], &["--accel", "brute"]] {
+        assert_refused(&folder.join("shared-vanishes.gltf"), "no triangles", more);
+    }
+}
