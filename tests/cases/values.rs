@@ -141,8 +141,8 @@ fn a_pane_reflects_as_one_and_two_panes_as_two() {
     }
 }
 
-/// The references have a noise of .1 % of their mean. That of the largest terrain is no measure for places: its patch of sun lies
-/// elsewhere than in the next smaller one's, from which the same is seen.
+/// The references have a noise of .1 % of their mean. That of the largest terrain is compared by its mean alone: its patch of sun
+/// differs from that of the next smaller one, in which the same is to be seen.
 #[test]
 fn a_room_with_a_window_is_as_a_path_tracer_has_it_whatever_lies_outside() {
     let Some(folder) = folder("32") else { return };
