@@ -56,12 +56,13 @@ vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector,
     uint end = of_one ? chosen + 1u : settings.light_count;
     reflector.diffuse = vec3(0.0);
     vec3 sum = vec3(0.0);
-    for (uint i = begin; i < end && !loops_cut; i++) {
-        Light light = light_at(i);
+    // Triangles come first, and may be many.
+    for (uint i = end; i > begin && light_at(i - 1u).kind != TRIANGLE_LIGHT && !loops_cut; i--) {
+        Light light = light_at(i - 1u);
         if (!is_punctual(light.kind)) {
             continue;
         }
-        PunctualLight lamp = punctual_light_at(i);
+        PunctualLight lamp = punctual_light_at(i - 1u);
         vec3 origin = origin_towards(met.surface, arriving_from(lamp, light.kind, met.surface.position, place).ray);
         Arriving arriving = arriving_from(lamp, light.kind, origin, place);
         vec3 l = normalize(arriving.ray);
