@@ -245,7 +245,7 @@ device_structs! {
         /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED`], [`SEE_THROUGH`], [`COINCIDENT`], [`BACKED`], and the rank from bit
         /// [`RANK`] on; what instances share has none.
         pub flags: u32,
-        /// Index of its light, or [`NO_LIGHT`].
+        /// Index of its light, the first of those of its parts, or [`NO_LIGHT`].
         pub light: u32,
     }
 
@@ -357,7 +357,7 @@ device_structs! {
         pub triangle: u32,
         /// Its probability, nearly in proportion to its flux.
         pub probability: f32,
-        /// Area of the triangle, or of the disc that a distant light's photons start from.
+        /// Area of the triangle, or of its part, or of the disc that a distant light's photons start from.
         pub area: f32,
         /// [`TRIANGLE_LIGHT`], [`POINT_LIGHT`], [`SPOT_LIGHT`], [`DIRECTIONAL_LIGHT`] or [`ENVIRONMENT_LIGHT`].
         pub kind: u32,
@@ -374,7 +374,8 @@ device_structs! {
         pub intensity: [f32; 3],
         /// Spot: 1 − cos of the angle where it begins to fall off.
         pub inner: f32,
-        /// Point, spot: where it is. Directional: centre of the disc.
+        /// Point, spot: where it is. Directional: centre of the disc. Triangle: which of its parts, each a light of its own, this one is:
+        /// column and row, and how many columns there are; all of it is 0, 0, 1. They follow each other row by row.
         pub position: [f32; 3],
         /// Spot: 1 − cos of the angle where it ends.
         pub outer: f32,

@@ -140,9 +140,9 @@ AimedStart emit_point(PunctualLight light, uint kind, vec2 place, vec2 u, Target
 // Where a sphere takes up more than this of the directions, sin² of its cone's angle, they are chosen by their cosine.
 const float WIDE_CONE = 0.5;
 
-AimedStart emit_triangle(Light light, vec2 place, vec2 u, float side, Target target) {
+AimedStart emit_triangle(uint index, Light light, vec2 place, vec2 u, float side, Target target) {
     PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
-    Surface emitter = surface_at(triangle, triangle_point(place));
+    Surface emitter = surface_at(triangle, point_of_light(index, place));
     Material material = material_of(emitter);
     vec3 normal = emitter.geometric_normal;
     bool both_sides = emits(material, false);
@@ -181,7 +181,7 @@ AimedStart emit_from(uint index, vec2 place, vec2 direction, float side, Target 
     if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
         return emit_environment(light.area, place, direction, target);
     }
-    return emit_triangle(light, place, direction, side, target);
+    return emit_triangle(index, light, place, direction, side, target);
 }
 
 // A sphere that is seen within less than this, sin² of its cone's angle, is worth aiming at from a matte surface.

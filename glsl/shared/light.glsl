@@ -2,6 +2,8 @@
 
 #include "alias_table.glsl"
 
+layout(constant_id = 31) const bool PARTED_LIGHTS = false; // triangles whose parts are lights
+
 const uint TRIANGLE_LIGHT = 0u;
 const uint POINT_LIGHT = 1u;
 const uint SPOT_LIGHT = 2u;
@@ -12,7 +14,7 @@ const uint ENVIRONMENT_LIGHT = 4u;
 struct Light {
     uint triangle;
     float probability; // nearly in proportion to its flux
-    float area;        // of the triangle, or of the disc that a distant light's photons start from; render units²
+    float area;        // of the triangle or its part, or of the disc that a distant light's photons start from; render units²
     uint kind;
 };
 
@@ -57,6 +59,38 @@ Media media_of_light(uint light) {
         media = Media(names.x, names.yzw);
     }
     return media;
+}
+
+// Which part of its triangle a light is: column, row, and how many columns there are. See scene::part.
+vec3 part_of(uint light) {
+    return TEXEL(Lights, LIGHT_TEXELS * light + 3u).xyz;
+}
+
+// Barycentric coordinates of a point of a triangle's light.
+vec2 point_of_light(uint light, vec2 u) {
+    vec2 uv = triangle_point(u);
+    if (PARTED_LIGHTS) {
+        vec3 part = part_of(light);
+        vec2 at = (part.xy + uv) / part.z;
+        uv = part.x + part.y >= part.z ? 1.0 - at : at;
+    }
+    return uv;
+}
+
+// The light that a place of a triangle belongs to.
+uint light_at_place(Surface surface) {
+    uint light = surface.light;
+    if (PARTED_LIGHTS) {
+        float n = part_of(light).z;
+        vec2 at = surface.uv * n;
+        float row = clamp(floor(at.y), 0.0, n - 1.0);
+        float column = clamp(floor(at.x), 0.0, n - 1.0 - row);
+        bool upside_down = at.x - column + at.y - row > 1.0 && column + row + 1.0 < n;
+        vec2 cell = vec2(column, row);
+        cell = upside_down ? n - 1.0 - cell : cell;
+        light += uint(cell.y * n + cell.x);
+    }
+    return light;
 }
 
 bool is_punctual(uint kind) {

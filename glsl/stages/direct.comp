@@ -110,7 +110,7 @@ Question ask_light(vec3 position, vec3 normal, vec3 origin, uint of_source, vec3
         question.sky = sample_environment(u.yz, question.ray);
     } else {
         PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
-        Surface emitter = surface_at(triangle, triangle_point(u.yz));
+        Surface emitter = surface_at(triangle, point_of_light(chosen, u.yz));
         // Both ends move off their surfaces.
         question.ray = origin_towards(emitter, position - emitter.position) - origin;
         question.end = 1.0 - ENDS_BEFORE;
@@ -275,7 +275,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
         }
         float probability = question.probability;
         if (by_bsdf) {
-            probability = probability_of_light(position, shading_normal, of_source, emitter.light);
+            probability = probability_of_light(position, shading_normal, of_source, light_at_place(emitter));
         }
         if (FEW_SOURCES && probability <= 0.0) {
             return vec3(0.0);

@@ -71,6 +71,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     let memory = memory(&scene, &packed);
     let count = |is: fn(&Surface) -> bool| scene.materials.iter().filter(|material| is(&material.surface)).count();
     let emissive = scene.emissive_triangles().len();
+    let notes: Vec<&String> = scene.notes.iter().chain(&packed.notes).collect();
     let to_world = |p: glam::Vec3| p.as_dvec3() / scene.normalisation.scale + scene.normalisation.centre;
     let (low, high) = scene.bounds();
     let (low, high) = (to_world(low), to_world(high));
@@ -102,7 +103,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
                 "resolution": config.resolution,
                 "photons": config.photons,
             })),
-            "notes": scene.notes,
+            "notes": notes,
             "warnings": scene.warnings,
         });
         return Ok(serde_json::to_string_pretty(&value)? + "\n");
@@ -176,7 +177,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
             mebibytes(memory.render)
         )?;
     }
-    for note in &scene.notes {
+    for note in notes {
         writeln!(text, "note         {note}")?;
     }
     for warning in &scene.warnings {

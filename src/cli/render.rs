@@ -57,6 +57,9 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let config = config(arguments, gather, camera);
     let packed = while_showing(BUILDING, quiet, || PackedScene::new(&scene))
         .map_err(|what| crate::error::Error::scene(path, what))?;
+    for note in &packed.notes {
+        say!("note: {note}");
+    }
     let features = &packed.features;
     let chooses = features.dispersion || features.alpha || features.partly_clear || features.coat || features.soft;
     if config.estimator == Estimator::Ppm && chooses {

@@ -11,11 +11,13 @@ use super::contact::Interface;
 use super::environment::{Environment, Sky};
 use super::gloss::Reflector;
 use super::intersect::{Hit, PlacedTriangle, Ray};
-use super::light::{Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual};
+use super::light::{
+    Arriving, arriving_from, choose_light, emits, emitted_radiance, is_punctual, light_at_place, point_of_light,
+};
 use super::light_sources::{self, choose_light_for, choose_light_of, probability_for};
 use super::media::{Media, transmittance};
 use super::resolve::photons_of;
-use super::sampling::{cosine_direction, decode_direction, triangle_point};
+use super::sampling::{cosine_direction, decode_direction};
 use super::surface::{DIELECTRIC, offset_origin, reach_of, surface_at, surface_of};
 use super::texture::{apply_textures, nearest_visible, share_there};
 use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
@@ -225,7 +227,7 @@ fn sample_direct(
     let environment = Environment::of(&inputs.scene.environment);
 
     let by_bsdf = way < q;
-    let (mut emitter, seen_light) = if by_bsdf {
+    let (mut emitter, asked_light, seen_light) = if by_bsdf {
         let direction = match wide {
             Some((reflector, viewer)) if choice < reflections => {
                 reflector.reflected_direction(shading_normal, viewer, [u, v])
@@ -240,7 +242,7 @@ fn sample_direct(
             return seen.of(sky(environment.at(direction), direction));
         };
         let met = Interface::new(inputs, hit, direction, Media::VACUUM, false, random);
-        (met.surface, seen)
+        (met.surface, None, seen)
     } else {
         let (index, probability) = match source {
             Some(source) => choose_light_of(inputs, source, first_digits),
@@ -264,14 +266,14 @@ fn sample_direct(
             let (direction, sampled) = environment.sample(u, v);
             return look_for(direction, FAR, None).map_or(nothing, |seen| seen.of(sky(sampled, direction)));
         }
-        let (u, v) = triangle_point(u, v);
+        let (u, v) = point_of_light(light, DVec2::new(u, v));
         let emitter = surface_at(inputs.scene, PlacedTriangle::unplaced(light.triangle), u, v);
         let direction = emitter.origin_towards(position - emitter.position) - origin;
         let ignored = Some(PlacedTriangle::unplaced(light.triangle));
         let Some(seen) = look_for(direction, 1.0 - ENDS_BEFORE, ignored) else {
             return nothing;
         };
-        (emitter, seen)
+        (emitter, Some(index as u32), seen)
     };
     if emitter.light == NO_LIGHT {
         return nothing;
@@ -293,7 +295,7 @@ fn sample_direct(
     let radiance = there
         * emitted_radiance(&emitter.material, cos_light.abs())
         * between(emitter.light as usize, to_light.length());
-    let probability = probability_of(emitter.light);
+    let probability = probability_of(asked_light.unwrap_or_else(|| light_at_place(&inputs.scene.lights, &emitter)));
     if source.is_some() && probability == 0.0 {
         return nothing;
     }

@@ -7,9 +7,9 @@ use glam::{DVec2, DVec3};
 use super::Inputs;
 use super::environment::Environment;
 use super::intersect::{PlacedTriangle, Ray};
-use super::light::{choose_light, emits, emitted_radiance, spot_falloff};
+use super::light::{choose_light, emits, emitted_radiance, point_of_light, spot_falloff};
 use super::media::Media;
-use super::sampling::{basis, cosine_direction, direction_in_cone, disc_point, triangle_point};
+use super::sampling::{basis, cosine_direction, direction_in_cone, disc_point};
 use super::surface::{offset_origin, surface_at};
 use super::texture::{apply_textures, share_there};
 use super::vector::rgb;
@@ -257,7 +257,7 @@ fn from_triangle(
     side: f64,
     target: Option<Sphere>,
 ) -> Start {
-    let (x, y) = triangle_point(place.x, place.y);
+    let (x, y) = point_of_light(light, place);
     let triangle = PlacedTriangle::unplaced(light.triangle);
     let mut emitter = surface_at(inputs.scene, triangle, x, y);
     apply_textures(inputs.scene, &mut emitter);

@@ -5,10 +5,12 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::gloss::coat_passes;
-use super::sampling::direction_in_cone;
+use super::sampling::{direction_in_cone, triangle_point};
+use super::surface::Surface;
 use super::vector::rgb;
 use crate::alias::{self, AliasCell};
 use crate::layout::{BACK_EMITS, DIRECTIONAL_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT};
+use crate::scene::Part;
 
 /// By the alias method, with the digits of `u` in [0, 1) and of two more numbers below it.
 pub(super) fn choose_light(lights: &[Light], u: f64, digits: [f64; 2]) -> alias::Choice {
@@ -16,6 +18,18 @@ pub(super) fn choose_light(lights: &[Light], u: f64, digits: [f64; 2]) -> alias:
         accept: lights[cell].accept,
         alias: lights[cell].alias,
     })
+}
+
+/// Barycentric coordinates of a point of a triangle's light.
+pub(super) fn point_of_light(light: &Light, u: DVec2) -> (f64, f64) {
+    let (u, v) = triangle_point(u.x, u.y);
+    Part::of(light).place(DVec2::new(u, v)).into()
+}
+
+/// Index of the light that a place of a triangle belongs to.
+pub(super) fn light_at_place(lights: &[Light], emitter: &Surface) -> u32 {
+    let [.., columns] = lights[emitter.light as usize].position;
+    emitter.light + Part::around(emitter.uv.into(), columns as u32).number()
 }
 
 /// Whether light leaves on the triangle's front, or on its back.

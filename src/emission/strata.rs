@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::targets::{Targets, corners_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
-use crate::scene::{PackedScene, Sphere};
+use crate::scene::{PackedScene, Part, Sphere};
 
 /// Of a stratum's share of the power, what its probability is at least: no photon carries much more than by power.
 const FLOOR: f64 = 0.2;
@@ -70,6 +70,11 @@ fn lights_of<'a>(scene: &'a PackedScene, source: &Range<u32>) -> &'a [Light] {
     &scene.lights[source.start as usize..source.end as usize]
 }
 
+/// Without parts of triangles that are surely dark.
+fn shining<'a>(scene: &'a PackedScene, source: &Range<u32>) -> impl Iterator<Item = &'a Light> {
+    lights_of(scene, source).iter().filter(|light| light.probability > 0.0)
+}
+
 /// A source's first probability: half of it for specular targets, if there are any and others too.
 fn share_out(strata: &mut [Stratum], targets: &Targets, probability: f64) {
     let is_specular = |stratum: &Stratum| {
@@ -104,7 +109,7 @@ fn points_of(scene: &PackedScene, light: &Light) -> [DVec3; 3] {
     if [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) {
         return [Vec3::from_array(light.position).as_dvec3(); 3];
     }
-    corners_of(&scene.shading_triangles[light.triangle as usize])
+    Part::of(light).corners(corners_of(&scene.shading_triangles[light.triangle as usize]))
 }
 
 /// Whether no path of a source that meets anything passes by a sphere.
@@ -121,13 +126,13 @@ fn is_met_by_all(scene: &PackedScene, source: &Range<u32>, targets: &Targets, sp
         sphere.contains(&point)
     };
     let all_inside = |light: &Light| points_of(scene, light).into_iter().all(|point| inside(light, point));
-    let mut lights = lights_of(scene, source).iter();
+    let mut lights = shining(scene, source);
     lights.all(|light| !is_distant(light) && all_inside(light))
 }
 
 /// About the share of a source's paths, by its own density, that a density uniform among those towards a sphere has.
 fn share(scene: &PackedScene, source: &Range<u32>, sphere: &Sphere) -> f64 {
-    let lights = lights_of(scene, source);
+    let lights: Vec<&Light> = shining(scene, source).collect();
     let probes = lights.iter().step_by(lights.len().div_ceil(PROBES));
     let count = probes.len() as f64;
     let versine = |light: &Light, point: DVec3| {

@@ -2,7 +2,7 @@
 
 use crate::layout::{
     BACK_HIDDEN, BACKED, COINCIDENT, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT,
-    SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED,
+    SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED, TRIANGLE_LIGHT,
 };
 
 /// [`Material::surface`] of a mirror.
@@ -70,6 +70,8 @@ features! {
     punctual: "PUNCTUAL_LIGHTS",
     /// Some of those with an extent.
     soft: "SOFT_LIGHTS",
+    /// Triangles of several lights.
+    parted: "PARTED_LIGHTS",
     /// An environment.
     environment: "ENVIRONMENT",
     /// Textures, or colours of corners.
@@ -121,6 +123,7 @@ impl SceneFeatures {
         for light in lights {
             features.punctual |= [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&light.kind);
             features.soft |= light.extent > 0.0;
+            features.parted |= light.kind == TRIANGLE_LIGHT && light.position[2] > 1.0;
             features.environment |= light.kind == ENVIRONMENT_LIGHT;
         }
         features

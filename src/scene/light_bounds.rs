@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 
 use super::environment::Environment;
 use super::light_table::Lights;
+use super::part::Part;
 use super::sphere::Sphere;
 use crate::layout::{
     DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, LightSource, POINT_LIGHT, SPOT_LIGHT, TRIANGLE_LIGHT,
@@ -54,19 +55,27 @@ fn of_triangles(
     corners: &[[Vec3; 3]],
     two_sided: &impl Fn(u32) -> bool,
 ) -> LightSource {
-    let corners_of = |light: &Light| corners[light.triangle as usize].map(Vec3::as_dvec3);
-    let sphere = Sphere::around(lights.iter().flat_map(corners_of)).unwrap_or(Sphere {
+    // Parts that are surely dark bring nothing.
+    let shining = || {
+        lights
+            .iter()
+            .zip(powers)
+            .filter(|(_, power)| **power > 0.0)
+            .map(|(light, _)| light)
+    };
+    let corners_of = |light: &Light| Part::of(light).corners(corners[light.triangle as usize].map(Vec3::as_dvec3));
+    let sphere = Sphere::around(shining().flat_map(corners_of)).unwrap_or(Sphere {
         centre: DVec3::ZERO,
         radius: 0.0,
     });
     let normals = || {
-        lights.iter().map(|light| {
+        shining().map(|light| {
             let [a, b, c] = corners_of(light);
             (b - a).cross(c - a)
         })
     };
     let axis = normals().sum::<DVec3>().normalize_or_zero();
-    let both = lights.iter().any(|light| two_sided(light.triangle));
+    let both = shining().any(|light| two_sided(light.triangle));
     let narrowest = normals()
         .map(|normal| axis.dot(normal.normalize_or_zero()))
         .fold(1.0, f64::min);

@@ -7,7 +7,7 @@ use crate::layout::Light;
 /// Sources at the most: each has paths towards each target.
 pub const MOST_SOURCES: usize = 32;
 
-/// The part of all choices within a source that goes to each of its lights alike instead of by power.
+/// The part of all choices within a source that goes to each of its triangles and other lights alike instead of by power.
 const ALIKE: f64 = 0.1;
 
 /// What a cumulative probability is a multiple of, as random numbers are.
@@ -30,14 +30,16 @@ pub(super) fn bundled(lights: &[Light], sources: Vec<Range<u32>>) -> Vec<Range<u
         .collect()
 }
 
-/// Sets the cumulative probabilities of a source's lights: by power for the most part. Each has a step at least.
-pub(super) fn set_cumulative(lights: &mut [Light], powers: &[f64]) {
+/// Sets the cumulative probabilities of a source's lights: by power for the most part. Each has a step at least. `of_triangles`: what
+/// part of its triangle's power each has.
+pub(super) fn set_cumulative(lights: &mut [Light], powers: &[f64], of_triangles: &[f64]) {
     let count = lights.len() as f64;
     let total: f64 = powers.iter().sum();
+    let triangles: f64 = of_triangles.iter().sum();
     let mut sum = 0.0;
-    for (number, (light, power)) in (1u32..).zip(lights.iter_mut().zip(powers)) {
+    for (number, ((light, power), of_triangle)) in (1u32..).zip(lights.iter_mut().zip(powers).zip(of_triangles)) {
         let by_power = if total > 0.0 { power / total } else { 1.0 / count };
-        sum += (1.0 - ALIKE) * by_power + ALIKE / count;
+        sum += (1.0 - ALIKE) * by_power + ALIKE * of_triangle / triangles;
         let steps = f64::from(number) + sum * (STEPS - count);
         light.cumulative = (steps.round() / STEPS).min(1.0) as f32;
     }
@@ -55,7 +57,7 @@ mod tests {
     fn every_light_of_a_source_has_its_turn() {
         let mut lights = vec![Light::zeroed(); 1000];
         let powers: Vec<f64> = (0..1000).map(|i| 10f64.powi(-(i % 20))).collect();
-        set_cumulative(&mut lights, &powers);
+        set_cumulative(&mut lights, &powers, &[1.0; 1000]);
         let mut before = 0.0;
         for light in &lights {
             assert!(light.cumulative > before, "{} after {before}", light.cumulative);

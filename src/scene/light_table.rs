@@ -7,7 +7,8 @@ use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
 use super::punctual::{Emission, PunctualLight};
-use super::{EmissiveTriangle, Scene, light_sources};
+use super::shine::Shine;
+use super::{EmissiveTriangle, Part, Scene, light_sources};
 use crate::alias::alias_table;
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT, TRIANGLE_LIGHT};
 
@@ -25,23 +26,28 @@ struct Candidate {
     power: f64,
     /// Part of its object's flux; 1 for what is no triangle.
     share: f64,
+    /// Part of its triangle's flux; 1 for what is no triangle.
+    of_triangle: f64,
 }
 
 /// All lights of a scene.
 pub(super) struct Lights {
-    /// Triangles by object and in leaf order, punctual ones, the environment; with the alias table.
+    /// Triangles by object and in leaf order, each with its parts; punctual ones, the environment. With the alias table.
     pub lights: Vec<Light>,
-    /// What each emits, mean of RGB.
+    /// What each emits, mean of RGB; 0 of what is surely dark.
     pub powers: Vec<f64>,
     /// Ranges of them.
     pub sources: Vec<Range<u32>>,
     /// What they emit together, mean of RGB.
     pub power: f64,
+    /// Whether some triangle would have to have more parts.
+    pub is_coarse: bool,
 }
 
 /// The lights, where triangles lie in this order.
 pub(super) fn lights(scene: &Scene, order: &[u32]) -> Lights {
-    let (mut candidates, mut sources) = emissive_triangles(scene, order);
+    let (shining, is_coarse) = scene.shining_triangles();
+    let (mut candidates, mut sources) = emissive_triangles(scene, order, shining);
     let triangles = candidates.len() as u32;
     let punctual_lights = scene.lights.iter().map(|light| punctual(scene, light));
     let mut others: Vec<(Light, f64)> = punctual_lights.chain(environment(scene)).collect();
@@ -51,6 +57,7 @@ pub(super) fn lights(scene: &Scene, order: &[u32]) -> Lights {
         light,
         power,
         share: 1.0,
+        of_triangle: 1.0,
     }));
     sources.extend((triangles..candidates.len() as u32).map(|light| light..light + 1));
     let power: f64 = candidates.iter().map(|candidate| candidate.power).sum();
@@ -60,18 +67,24 @@ pub(super) fn lights(scene: &Scene, order: &[u32]) -> Lights {
         .map(|candidate| (1.0 - ALIKE) * candidate.power / power + ALIKE * candidate.share / shares)
         .collect();
     let powers: Vec<f64> = candidates.iter().map(|candidate| candidate.power).collect();
+    let of_triangles: Vec<f64> = candidates.iter().map(|candidate| candidate.of_triangle).collect();
     let mut lights: Vec<Light> = candidates.into_iter().map(|candidate| candidate.light).collect();
     set_alias_table(&mut lights, &probabilities);
     let sources = light_sources::bundled(&lights, sources);
     for source in &sources {
         let within = source.start as usize..source.end as usize;
-        light_sources::set_cumulative(&mut lights[within.clone()], &powers[within]);
+        light_sources::set_cumulative(
+            &mut lights[within.clone()],
+            &powers[within.clone()],
+            &of_triangles[within],
+        );
     }
     Lights {
         lights,
         powers,
         sources,
         power,
+        is_coarse,
     }
 }
 
@@ -84,35 +97,56 @@ pub(crate) fn set_alias_table(lights: &mut [Light], probabilities: &[f64]) {
     }
 }
 
-/// And the range of each object's.
-fn emissive_triangles(scene: &Scene, order: &[u32]) -> (Vec<Candidate>, Vec<Range<u32>>) {
+/// Lights of triangles, and the range of each object's.
+fn emissive_triangles(
+    scene: &Scene,
+    order: &[u32],
+    mut shining: Vec<(EmissiveTriangle, Shine)>,
+) -> (Vec<Candidate>, Vec<Range<u32>>) {
     let mut place = vec![0; scene.triangles.len()];
     for (packed, &index) in order.iter().enumerate() {
         place[index as usize] = packed as u32;
     }
-    let mut emissive = scene.emissive_triangles();
     let object_of = |light: &EmissiveTriangle| scene.triangles[light.triangle as usize].object as usize;
-    emissive.sort_by_key(|light| (object_of(light), place[light.triangle as usize]));
+    shining.sort_by_key(|(light, _)| (object_of(light), place[light.triangle as usize]));
+    for of_object in shining.chunk_by_mut(|(a, _), (b, _)| object_of(a) == object_of(b)) {
+        if of_object.iter().all(|(_, shine)| shine.is_dark()) {
+            of_object.iter_mut().for_each(|(_, shine)| shine.not_dark());
+        }
+    }
     let mut power_of_objects = vec![0.0; scene.objects.len()];
-    for light in &emissive {
+    for (light, _) in &shining {
         power_of_objects[object_of(light)] += light.power;
     }
     let mut sources = Vec::new();
-    for lights in emissive.chunk_by(|a, b| object_of(a) == object_of(b)) {
+    for lights in shining.chunk_by(|(a, _), (b, _)| object_of(a) == object_of(b)) {
         let first = sources.last().map_or(0, |source: &Range<u32>| source.end);
-        sources.push(first..first + lights.len() as u32);
+        let count: u32 = lights.iter().map(|(_, shine)| shine.columns.pow(2)).sum();
+        sources.push(first..first + count);
     }
-    let candidates = emissive
-        .iter()
-        .map(|emissive| Candidate {
+    let parts = shining.iter().flat_map(|(emissive, shine)| {
+        let parts = shine.columns.pow(2);
+        (0..parts).map(move |number| {
+            (
+                emissive,
+                shine.share(number),
+                Part::numbered(number, shine.columns),
+                parts,
+            )
+        })
+    });
+    let candidates = parts
+        .map(|(emissive, of_triangle, part, parts)| Candidate {
             light: Light {
                 kind: TRIANGLE_LIGHT,
                 triangle: place[emissive.triangle as usize],
-                area: emissive.area as f32,
+                area: (emissive.area / f64::from(parts)) as f32,
+                position: part.packed(),
                 ..Light::zeroed()
             },
-            power: emissive.power,
-            share: emissive.power / power_of_objects[object_of(emissive)],
+            power: emissive.power * of_triangle,
+            share: emissive.power * of_triangle / power_of_objects[object_of(emissive)],
+            of_triangle,
         })
         .collect();
     (candidates, sources)

@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::environment::Environment;
+use super::part::Part;
 use super::sphere::Sphere;
 use crate::layout::{ENVIRONMENT_LIGHT, Light, TRIANGLE_LIGHT};
 
@@ -18,6 +19,8 @@ const SAMPLING: [f64; 2] = [0.05, 0.5];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NearLights<'a> {
     pub lights: &'a [Light],
+    /// What each emits; 0 of what is surely dark.
+    pub powers: &'a [f64],
     /// Ranges of them.
     pub sources: &'a [Range<u32>],
     /// Of all triangles, in the order of the BVH's leaves.
@@ -32,19 +35,24 @@ impl NearLights<'_> {
         if self.environment.is_some() {
             return vec![[0.0, 0.0, 0.0, f32::INFINITY]];
         }
-        let sphere = |source: &Range<u32>| {
-            let lights = &self.lights[source.start as usize..source.end as usize];
-            match lights[0].kind {
-                TRIANGLE_LIGHT => self.around(lights),
-                _ => None,
-            }
+        let sphere = |source: &Range<u32>| match self.lights[source.start as usize].kind {
+            TRIANGLE_LIGHT => self.around(source),
+            _ => None,
         };
         self.sources.iter().filter_map(sphere).collect()
     }
 
-    fn around(&self, lights: &[Light]) -> Option<[f32; 4]> {
-        let of_light = |light: &Light| self.corners[light.triangle as usize].map(Vec3::as_dvec3);
-        let sphere = Sphere::around(lights.iter().flat_map(of_light))?;
+    /// Those of a range that shine.
+    fn shining(&self, range: Range<usize>) -> impl Iterator<Item = &Light> + Clone {
+        let with_powers = self.lights[range.clone()].iter().zip(&self.powers[range]);
+        with_powers.filter(|(_, power)| **power > 0.0).map(|(light, _)| light)
+    }
+
+    fn around(&self, source: &Range<u32>) -> Option<[f32; 4]> {
+        let of_light =
+            |light: &Light| Part::of(light).corners(self.corners[light.triangle as usize].map(Vec3::as_dvec3));
+        let lights = self.shining(source.start as usize..source.end as usize);
+        let sphere = Sphere::around(lights.flat_map(of_light))?;
         let radius2 = (REACH * sphere.radius).powi(2);
         Some(sphere.centre.as_vec3().extend(radius2 as f32).to_array())
     }
@@ -53,12 +61,15 @@ impl NearLights<'_> {
     /// the scene's area that emits, or of all directions that the environment's light comes from, half of which lie below a
     /// surface.
     pub fn bsdf_sampling(&self, area_of_all: f64) -> f32 {
-        let of_kind = |kind: u32| self.lights.iter().filter(move |light| light.kind == kind);
-        let from_afar: f64 = of_kind(ENVIRONMENT_LIGHT)
+        let environments = self.lights.iter().filter(|light| light.kind == ENVIRONMENT_LIGHT);
+        let from_afar: f64 = environments
             .zip(self.environment)
             .map(|(light, environment)| f64::from(light.probability) * environment.spread())
             .sum();
-        let emissive: f64 = of_kind(TRIANGLE_LIGHT).map(|light| f64::from(light.area)).sum();
+        let triangles = self
+            .shining(0..self.lights.len())
+            .filter(|light| light.kind == TRIANGLE_LIGHT);
+        let emissive: f64 = triangles.map(|light| f64::from(light.area)).sum();
         (emissive / area_of_all + 0.5 * from_afar).clamp(SAMPLING[0], SAMPLING[1]) as f32
     }
 }

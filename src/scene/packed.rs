@@ -12,8 +12,8 @@ use super::near_lights::NearLights;
 use super::nesting::Nesting;
 use super::object_grid::object_grids;
 use super::{
-    Alpha, Dielectric, Environment, Gloss, MaterialTextures, SHARED, Scene, Surface, area, bvh, contact, environment,
-    light_bounds, light_table,
+    Alpha, Dielectric, Environment, Gloss, MaterialTextures, Part, SHARED, Scene, Surface, area, bvh, contact,
+    environment, light_bounds, light_table,
 };
 use crate::layout::{
     BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, HavelTriangle, Instance, Light, LightSource, MASK, MIRRORED,
@@ -23,6 +23,9 @@ use crate::layout::{
 
 /// Sources of light of which each is asked by a ray of its own; of more one is chosen.
 const ASKED_ALL: usize = 4;
+
+const COARSE_LIGHTS: &str = "textures of lamps have more texels than lights are kept for: the picture is right, but where single \
+                             texels shine, light is chosen by areas of several texels, and is noisier";
 
 /// What the ray stages read, in the order of the BVH's leaves.
 #[derive(Debug, Clone)]
@@ -74,6 +77,8 @@ pub struct PackedScene {
     pub immersion: Immersion,
     /// Of each light, the media that it is in: see [`Immersion::media_at`].
     pub media_of_lights: Vec<[u32; 4]>,
+    /// What a user should know of it, beside [`Scene::notes`].
+    pub notes: Vec<String>,
 }
 
 impl PackedScene {
@@ -112,7 +117,7 @@ impl PackedScene {
             .lights
             .iter()
             .enumerate()
-            .filter(|(_, light)| light.kind == TRIANGLE_LIGHT);
+            .filter(|(_, light)| light.kind == TRIANGLE_LIGHT && Part::of(light).number() == 0);
         for (index, light) in emissive {
             shading_triangles[light.triangle as usize].light = index as u32;
         }
@@ -139,6 +144,7 @@ impl PackedScene {
         let (object_grids, object_cells) = object_grids(scene);
         let near_lights = NearLights {
             lights: &light_table.lights,
+            powers: &light_table.powers,
             sources: &light_table.sources,
             corners: &corners,
             environment: scene.environment.as_ref(),
@@ -153,6 +159,11 @@ impl PackedScene {
         let light_sources = light_bounds::light_sources(&light_table, &corners, two_sided, scene.environment.as_ref());
         Ok(Self {
             power: light_table.power,
+            notes: if light_table.is_coarse {
+                vec![COARSE_LIGHTS.to_owned()]
+            } else {
+                Vec::new()
+            },
             corners: if features.textured {
                 texture_corners(scene, &bvh.order)
             } else {

@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::LazyLock;
 
-use glam::{DVec2, DVec4, dvec4};
+use glam::{DVec2, DVec4, UVec2, dvec4};
 use gltf::json;
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::texture::{MagFilter, WrappingMode};
@@ -243,32 +244,71 @@ impl TextureLookup {
     /// The value of the texture, RGBA, linear; `sets` are the coordinates of both sets. There are no mip levels: a pixel is
     /// the mean of many places.
     pub fn value(&self, texels: &[u32], sets: [DVec2; 2]) -> DVec4 {
-        let set = sets[usize::from(self.flags & SECOND_SET != 0)];
-        let place = |row: [f32; 3]| f64::from(row[0]) * set.x + f64::from(row[1]) * set.y + f64::from(row[2]);
-        let size = [self.size & 0xffff, self.size >> 16];
-        let [u, v] = [
-            place(self.row_u) * f64::from(size[0]),
-            place(self.row_v) * f64::from(size[1]),
-        ];
         // Past that, floats have no texels apart; NaN fails the comparison.
-        let [u, v] = [u, v].map(|at: f64| if at.abs() < 8_388_608.0 { at } else { 0.0 });
-        let texel = |x: i64, y: i64| {
-            let (x, y) = (
-                wrap(x, size[0], self.flags >> WRAP_U),
-                wrap(y, size[1], self.flags >> WRAP_V),
-            );
-            decode(
-                texels[(self.first_texel + y * size[0] + x) as usize],
-                self.flags & SRGB != 0,
-            )
-        };
+        let [u, v] = self
+            .place(sets)
+            .to_array()
+            .map(|at| if at.abs() < 8_388_608.0 { at } else { 0.0 });
+        let texel = |x: f64, y: f64| self.texel(texels, [x as i64, y as i64]);
         if self.flags & NEAREST != 0 {
-            return texel(u.floor() as i64, v.floor() as i64);
+            return texel(u.floor(), v.floor());
         }
         let (u, v) = (u - 0.5, v - 0.5);
         let (x, y) = (u.floor(), v.floor());
-        let row = |y| texel(x as i64, y).lerp(texel(x as i64 + 1, y), u - x);
-        row(y as i64).lerp(row(y as i64 + 1), v - y)
+        let row = |y| texel(x, y).lerp(texel(x + 1.0, y), u - x);
+        row(y).lerp(row(y + 1.0), v - y)
+    }
+
+    /// Where it is looked up, in texels.
+    fn place(&self, sets: [DVec2; 2]) -> DVec2 {
+        let set = sets[usize::from(self.flags & SECOND_SET != 0)];
+        let place = |row: [f32; 3]| f64::from(row[0]) * set.x + f64::from(row[1]) * set.y + f64::from(row[2]);
+        DVec2::new(place(self.row_u), place(self.row_v)) * self.size().as_dvec2()
+    }
+
+    /// Of its image, in texels.
+    fn size(&self) -> UVec2 {
+        UVec2::new(self.size & 0xffff, self.size >> 16)
+    }
+
+    /// Linear RGBA; where the image doesn't reach, what its wraps say.
+    fn texel(&self, texels: &[u32], [x, y]: [i64; 2]) -> DVec4 {
+        let size = self.size();
+        let column = wrap(x, size.x, self.flags >> WRAP_U);
+        let row = wrap(y, size.y, self.flags >> WRAP_V);
+        decode(
+            texels[(self.first_texel + row * size.x + column) as usize],
+            self.flags & SRGB != 0,
+        )
+    }
+
+    /// Texels along the longest way across a triangle.
+    pub(super) fn texels_across(&self, corners: [[DVec2; 2]; 3]) -> f64 {
+        let [a, b, c] = corners.map(|sets| self.place(sets));
+        [b - a, c - b, a - c]
+            .map(|way| way.abs().max_element())
+            .into_iter()
+            .fold(0.0, f64::max)
+    }
+
+    /// The largest value that a function of texels has among those that places of a triangle read, or 1 where they are many: at no
+    /// place the texture's is above that.
+    pub(super) fn most(&self, texels: &[u32], corners: [[DVec2; 2]; 3], value: impl Fn(DVec4) -> f64) -> f64 {
+        const MOST_READ: f64 = 1024.0;
+        let [a, b, c] = corners.map(|sets| self.place(sets));
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        // Where a device has rounded them to.
+        let off = 0.01 + 1e-6 * low.abs().max(high.abs());
+        let beside = if self.flags & NEAREST != 0 { 0.0 } else { 0.5 };
+        let (first, last) = ((low - off - beside).floor(), (high + off + beside).floor());
+        let read = (last - first + 1.0).element_product();
+        // NaN fails the comparison.
+        if !(read <= MOST_READ && low.abs().max(high.abs()).max_element() < 4_194_304.0) {
+            return 1.0;
+        }
+        let (first, last) = (first.as_i64vec2(), last.as_i64vec2());
+        let places = (first.y..=last.y).flat_map(|y| (first.x..=last.x).map(move |x| [x, y]));
+        places.map(|at| value(self.texel(texels, at))).fold(0.0, f64::max)
     }
 }
 
@@ -286,15 +326,21 @@ fn wrap(place: i64, count: u32, mode: u32) -> u32 {
 }
 
 fn decode(texel: u32, srgb: bool) -> DVec4 {
-    let [r, g, b, a] = texel.to_le_bytes().map(|byte| f64::from(byte) / 255.0);
-    // IEC 61966-2-1.
-    let linear = |value: f64| match value {
-        _ if !srgb => value,
+    let [r, g, b, a] = texel.to_le_bytes();
+    let [plain, decoded] = &*LINEAR;
+    let linear = |byte: u8| if srgb { decoded } else { plain }[usize::from(byte)];
+    dvec4(linear(r), linear(g), linear(b), plain[usize::from(a)])
+}
+
+/// What a byte means as it is, and as sRGB: IEC 61966-2-1.
+static LINEAR: LazyLock<[[f64; 256]; 2]> = LazyLock::new(|| {
+    let plain = std::array::from_fn(|byte| byte as f64 / 255.0);
+    let decoded = |value: f64| match value {
         dark if dark <= 0.040_45 => dark / 12.92,
         bright => ((bright + 0.055) / 1.055).powf(2.4),
     };
-    dvec4(linear(r), linear(g), linear(b), a)
-}
+    [plain, plain.map(decoded)]
+});
 
 #[cfg(test)]
 mod tests {

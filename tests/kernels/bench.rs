@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use bytemuck::Zeroable;
+use glam::{DVec3, Vec2, Vec3};
 use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
 use ppm_vk::emission::Aim;
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
-use ppm_vk::layout::{CAUSTIC, NO_OBJECT, Photon, Settings, VisiblePoint};
+use ppm_vk::layout::{CAUSTIC, NEAREST, NO_OBJECT, Photon, Settings, TextureLookup, VisiblePoint};
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::scene::{Emission, Environment, PackedScene, PunctualLight, Scene};
 use ppm_vk::stage::BufferId;
@@ -18,9 +19,17 @@ use ppm_vk::stage::BufferId;
 const LIT: &str = ", lit";
 /// The same where lights have an extent.
 const SOFTLY_LIT: &str = ", softly lit";
+/// The same where what shines has a pattern.
+const PATTERNED: &str = ", patterned";
 
-/// A scene of `scenes/`; with lights of every kind if the name ends in [`LIT`] or [`SOFTLY_LIT`].
+/// A scene of `scenes/`; with lights of every kind if the name ends in [`LIT`] or [`SOFTLY_LIT`], with lamps of a pattern if in
+/// [`PATTERNED`].
 pub fn scene(name: &str) -> Scene {
+    if let Some(name) = name.strip_suffix(PATTERNED) {
+        let mut scene = scene(name);
+        add_pattern(&mut scene);
+        return scene;
+    }
     if let Some(name) = name.strip_suffix(LIT) {
         let mut scene = scene(name);
         add_lights(&mut scene);
@@ -69,6 +78,35 @@ fn add_lights(scene: &mut Scene) {
     };
     let image = Image::new(32, 16, (0..512).map(pixel).collect());
     scene.environment = Some(Environment::new(image).expect("an environment").rotated(77.0));
+}
+
+/// Gives what shines a texture of which one texel in 32 is bright. They aren't blended: next to 0, rounding would be all there is.
+fn add_pattern(scene: &mut Scene) {
+    const SIDE: u32 = 32;
+    let mut lookup = TextureLookup::zeroed();
+    lookup.row_u = [4.0, 0.0, 0.0];
+    lookup.row_v = [0.0, 4.0, 0.0];
+    lookup.first_texel = scene.textures.texels.len() as u32;
+    lookup.size = SIDE | SIDE << 16;
+    lookup.flags = NEAREST;
+    let texel = |i: u32| if (i * 7) % 32 == i / 32 % 8 { u32::MAX } else { 0 };
+    scene.textures.texels.extend((0..SIDE * SIDE).map(texel));
+    scene.textures.lookups.push(lookup);
+    let texture = scene.textures.lookups.len() as u32 - 1;
+    for material in scene
+        .materials
+        .iter_mut()
+        .filter(|material| material.emission != Vec3::ZERO)
+    {
+        material.textures.emission = Some(texture);
+        material.emission *= 32.0;
+    }
+    // Across a floor or ceiling, and along walls.
+    let places = scene
+        .positions
+        .iter()
+        .map(|p| [Vec2::new(p.x + 0.3 * p.y, p.z - 0.7 * p.y); 2]);
+    scene.texcoords = places.collect();
 }
 
 /// A scene in the device's layout.

@@ -143,6 +143,17 @@ fn photons_in_a_scene_of_textures_land_where_the_cpus_do() {
 }
 
 #[test]
+fn photons_of_lamps_with_a_pattern_land_where_the_cpus_do() {
+    assert_photons_agree(
+        "cornell-spheres, patterned",
+        photons_carry_all_light(),
+        1e-4,
+        0.995,
+        4000,
+    );
+}
+
+#[test]
 fn photons_among_instances_land_where_the_cpus_do() {
     // The studs' normals are steep: they make more of what rounding makes of a place.
     assert_photons_agree("instances", photons_carry_all_light(), 1e-4, 0.98, 7000);

@@ -62,6 +62,7 @@ fn both_backends_render_the_same_picture() {
         ("textures", Estimator::Ppm, Direct::Photons),
         ("instances", Estimator::Sppm, Direct::Light),
         ("glossy, lit", Estimator::Sppm, Direct::Light),
+        ("glossy, patterned", Estimator::Sppm, Direct::Light),
         ("ring, lit", Estimator::Ppm, Direct::Photons),
     ] {
         let config = RenderConfig {

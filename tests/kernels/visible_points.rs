@@ -256,6 +256,9 @@ fn direct_light_agrees_at_the_same_visible_points() {
         ("ring, lit", 2000),
         ("glossy, lit", 1000),
         ("glossy, softly lit", 1000),
+        ("cornell-spheres, patterned", 1500),
+        ("glossy, patterned", 1500),
+        ("glossy, lit, patterned", 500),
     ] {
         let mut bench = Bench::new(name, small());
         // Light that grazes a surface has a cosine of which rounding is a larger part.

@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 use ppm_vk::scene::{Emission, EmissiveTriangle, Environment, LightUnits, LoadOptions, PackedScene};
 use serde_json::{Value, json};
@@ -61,6 +63,73 @@ fn a_scene_without_light_is_lit_by_radiance_1_from_all_around_and_says_so() {
     let scene = unlit.load_under(dim.clone()).expect("a scene");
     assert_eq!((scene.environment, scene.warnings), (Some(dim), vec![]));
     assert_eq!(Fixture::room().scene().environment, None);
+}
+
+/// The room with a lamp of so many texels along a side, white ones where `shines`.
+fn room_with_texels(side: u32, shines: impl Fn(u32, u32) -> bool) -> Fixture {
+    let mut room = Fixture::room();
+    let image = image::RgbaImage::from_fn(side, side, |x, y| image::Rgba([if shines(x, y) { 255 } else { 0 }; 4]));
+    let mut png = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut png, image::ImageFormat::Png).expect("a PNG");
+    let uri = format!("data:image/png;base64,{}", STANDARD.encode(png.into_inner()));
+    room.set("/images", json!([{ "uri": uri }]));
+    room.set("/textures", json!([{"source": 0}]));
+    let texcoords = room.add_floats("VEC2", 2, &[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    room.set("/meshes/1/primitives/0/attributes/TEXCOORD_0", json!(texcoords));
+    room.set("/materials/1/emissiveTexture", json!({"index": 0}));
+    room
+}
+
+/// One texel of 4,096 shines, blended with its neighbours: nearly all choices go to parts of the lamp that it reaches, and
+/// none to the others, though together they are all of the lamp.
+#[test]
+fn a_lamp_is_chosen_by_its_bright_texel() {
+    let room = room_with_texels(64, |x, y| [x, y] == [20, 9]);
+    let scene = room.scene();
+    let packed = PackedScene::new(&scene).expect("a hierarchy");
+    assert!(packed.features.parted && packed.notes.is_empty(), "{:?}", packed.notes);
+    assert_eq!(packed.lights.len(), 128 * 128);
+    let area: f64 = packed.lights.iter().map(|light| f64::from(light.area)).sum();
+    assert!((area / scene.emissive_triangles()[0].area - 1.0).abs() < 1e-4, "{area}");
+    let chosen: Vec<_> = packed.lights.iter().filter(|light| light.probability > 0.0).collect();
+    assert!((32..=72).contains(&chosen.len()), "{} parts are chosen", chosen.len());
+    let power = scene.emissive_triangles()[0].power;
+    let mut untextured = room;
+    untextured.remove("/materials/1/emissiveTexture");
+    // The triangle has half of the texture's texels.
+    let expected = untextured.scene().emissive_triangles()[0].power / 2048.0;
+    assert!(
+        (power / expected - 1.0).abs() < 0.1,
+        "a power of {power}, {expected} expected"
+    );
+}
+
+/// What shines evenly is one light, and so is what is dark: it has its turn all the same.
+#[test]
+fn a_lamp_that_shines_evenly_has_no_parts() {
+    for is_bright in [true, false] {
+        let scene = room_with_texels(64, |_, _| is_bright).scene();
+        let packed = PackedScene::new(&scene).expect("a hierarchy");
+        assert_eq!(
+            (packed.lights.len(), packed.features.parted),
+            (1, false),
+            "bright: {is_bright}"
+        );
+        assert_eq!(packed.lights[0].probability, 1.0, "bright: {is_bright}");
+    }
+}
+
+/// Of 1,024² texels every seventh shines: parts are larger than those, and it is said.
+#[test]
+fn a_lamp_of_too_many_texels_has_coarser_parts_and_it_is_said() {
+    let scene = room_with_texels(1024, |x, y| (x + 3 * y) % 49 == 0).scene();
+    let packed = PackedScene::new(&scene).expect("a hierarchy");
+    assert_eq!(packed.lights.len(), 256 * 256);
+    assert!(
+        packed.notes.len() == 1 && packed.notes[0].contains("noisier"),
+        "{:?}",
+        packed.notes
+    );
 }
 
 /// The room with lights of KHR_lights_punctual, each at a node of its own (3, 4, …).
