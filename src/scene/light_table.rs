@@ -6,6 +6,7 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
+use super::doubled_lights::take_doubles;
 use super::punctual::{Emission, PunctualLight};
 use super::shine::Shine;
 use super::{EmissiveTriangle, Part, Scene, light_sources};
@@ -40,13 +41,16 @@ pub(super) struct Lights {
     pub sources: Vec<Range<u32>>,
     /// What they emit together, mean of RGB.
     pub power: f64,
+    /// Triangles that lie where another one shines, and that one; in [`Scene::triangles`].
+    pub doubles: Vec<[u32; 2]>,
     /// Whether some triangle would have to have more parts.
     pub is_coarse: bool,
 }
 
 /// The lights, where triangles lie in this order.
 pub(super) fn lights(scene: &Scene, order: &[u32]) -> Lights {
-    let (shining, is_coarse) = scene.shining_triangles();
+    let (mut shining, is_coarse) = scene.shining_triangles();
+    let doubles = take_doubles(scene, &mut shining);
     let (mut candidates, mut sources) = emissive_triangles(scene, order, shining);
     let triangles = candidates.len() as u32;
     let punctual_lights = scene.lights.iter().map(|light| punctual(scene, light));
@@ -84,6 +88,7 @@ pub(super) fn lights(scene: &Scene, order: &[u32]) -> Lights {
         powers,
         sources,
         power,
+        doubles,
         is_coarse,
     }
 }

@@ -17,6 +17,7 @@ mod contact;
 mod curve;
 mod diagnostic;
 mod document;
+mod doubled_lights;
 mod draco;
 mod elements;
 mod environment;

@@ -220,3 +220,34 @@ fn a_doubled_pane_reflects_as_one_or_two_and_a_box_without_thickness_as_a_pane()
         }
     }
 }
+
+/// A lamp that a file has twice, looking down or to both sides, lights the floor as one does. Against the same scene with the lamp
+/// once; false alarms: what goes wrong is a factor of two, the noise of the mean of 64 pixels less than a twentieth of that.
+#[test]
+fn a_doubled_lamp_shines_as_one() {
+    let lit = |copies: usize, two_sided: bool, turned: bool| {
+        let mut model = Model::new();
+        let white = model.matte([0.8; 3], 0.0);
+        model.mesh(white, &floor(true, 1.0));
+        let shining = model.black(10.0);
+        model
+            .file
+            .set(&format!("/materials/{shining}/doubleSided"), json!(two_sided));
+        for copy in 0..copies {
+            let up = turned && copy == 1;
+            let place = |corner: Vec3| 0.2 * corner + Vec3::Y;
+            model.mesh(shining, &floor(up, 1.0).map(|triangle| triangle.map(place)));
+        }
+        model.camera(Vec3::new(0.9, 0.6, 0.0), Vec3::ZERO, 0.2);
+        pictures(&model.scene())
+    };
+    for (two_sided, turned) in [(false, false), (true, false), (true, true)] {
+        let once = lit(1, two_sided, false);
+        for ((by, twice), (_, once)) in lit(2, two_sided, turned).into_iter().zip(once) {
+            assert!(
+                (twice / once - 1.0).abs() < 0.1,
+                "two-sided: {two_sided}, one turned: {turned}, {by}: {twice} with the lamp twice, {once} once"
+            );
+        }
+    }
+}
