@@ -49,8 +49,8 @@ impl Scene {
             .emitting_objects()
             .flat_map(|(object, exitance)| object.triangles.clone().map(move |triangle| (triangle, exitance)))
             .collect();
-        let indices: Vec<u32> = triangles.iter().map(|&(triangle, _)| triangle).collect();
-        let (shines, is_coarse) = Shine::of_all(self, &indices);
+        let power = |&(triangle, exitance): &(u32, f64)| (triangle, exitance * self.triangle_area(triangle));
+        let (shines, is_coarse) = Shine::of_all(self, &triangles.iter().map(power).collect::<Vec<_>>());
         let shining = |((triangle, exitance), shine): ((u32, f64), Shine)| {
             let area = self.triangle_area(triangle);
             let emissive = EmissiveTriangle {

@@ -1,6 +1,7 @@
 //! How triangles shine over their area: the factor that textures and alpha make of their emission.
 
 use glam::{DVec2, DVec3, DVec4};
+use rayon::prelude::*;
 
 use super::part::Part;
 use super::{Alpha, Material, Scene, Triangle};
@@ -17,7 +18,8 @@ const MOST_ASKED: u64 = 1 << 22;
 /// Places for each texel along a side, and for each part: half a texel is as far as light is blended.
 const ASKED_A_TEXEL: f64 = 4.0;
 const ASKED_A_PART: u32 = 2;
-/// How many times the squared noise, of what is even, that parts may have which are cut no further.
+/// How many times the squared noise of what is even parts may have that are cut no further, where all of an object's triangles shine
+/// alike.
 const EVEN_ENOUGH: f64 = 1.1;
 /// Of a part's weight, what goes by the brightest texels that it may read: no place of a part as small as a texel shines more than
 /// 50 times above its weight.
@@ -61,15 +63,22 @@ impl Shine {
         self.shares.get(number as usize).copied().unwrap_or(1.0)
     }
 
-    /// Of triangles that emit, and whether some would have to be cut into more parts than they are.
-    pub fn of_all(scene: &Scene, triangles: &[u32]) -> (Vec<Self>, bool) {
-        let textured: Vec<Option<Textured<'_>>> = triangles.iter().map(|&index| Textured::of(scene, index)).collect();
+    /// Of triangles that emit, given with their powers as if there were no textures; and whether some would have to be cut into more
+    /// parts than they are.
+    pub fn of_all(scene: &Scene, triangles: &[(u32, f64)]) -> (Vec<Self>, bool) {
+        let textured = triangles.par_iter().map(|&(index, _)| Textured::of(scene, index));
+        let textured: Vec<Option<Textured<'_>>> = textured.collect();
         let asked = || textured.iter().flatten().map(Textured::asked);
         let within = |most: u32| asked().map(|asked| u64::from(asked.min(most)).pow(2)).sum::<u64>() <= MOST_ASKED;
         let most_asked = halved_until(ASKED[1], ASKED[0], within);
         let levels: Vec<Option<Level>> = textured
-            .iter()
-            .map(|textured| textured.as_ref().map(|textured| textured.level(most_asked)))
+            .par_iter()
+            .map(|textured| textured.as_ref().map(|textured| textured.finest(most_asked)))
+            .collect();
+        let enough = enough_noise(scene, triangles, &levels);
+        let levels = levels.into_iter().zip(enough);
+        let levels: Vec<Option<Level>> = levels
+            .map(|(level, enough)| level.map(|level| level.coarse_as(enough)))
             .collect();
         let columns = || levels.iter().flatten().map(|level| level.columns);
         let within = |most: u32| columns().map(|n| u64::from(n.min(most)).pow(2)).sum::<u64>() <= MOST_PARTS;
@@ -104,6 +113,28 @@ impl Shine {
     }
 }
 
+/// How much noise parts of each triangle may have: what hardly shines beside the rest of its object needn't be known well.
+fn enough_noise(scene: &Scene, triangles: &[(u32, f64)], levels: &[Option<Level>]) -> Vec<f64> {
+    let mean = |level: &Option<Level>| level.as_ref().map_or(1.0, |level| level.mean);
+    let powers = || {
+        triangles.iter().zip(levels).map(|(&(triangle, power), level)| {
+            let object = scene.triangles[triangle as usize].object as usize;
+            (object, power * mean(level))
+        })
+    };
+    let mut of_objects = vec![(0.0, 0.0); scene.objects.len()];
+    for (object, power) in powers() {
+        let (all, count) = &mut of_objects[object];
+        *all += power;
+        *count += 1.0;
+    }
+    let enough = |(object, power): (usize, f64)| {
+        let (all, count) = of_objects[object];
+        1.0 + (EVEN_ENOUGH - 1.0) * (all / (count * power)).max(1.0)
+    };
+    powers().map(enough).collect()
+}
+
 /// Half of a number, again and again, until it fits or is the least one.
 fn halved_until(mut number: u32, least: u32, fits: impl Fn(u32) -> bool) -> u32 {
     while number > least && !fits(number) {
@@ -120,7 +151,7 @@ struct Level {
     squares: Vec<f64>,
     /// And of the largest that its places may have: 0 where it is surely dark.
     most: Vec<f64>,
-    /// Whether more parts would be better, and texels fine enough for that.
+    /// Whether more parts would be better.
     is_coarse: bool,
 }
 
@@ -129,6 +160,20 @@ impl Level {
     fn noise(&self) -> f64 {
         let roots: f64 = self.squares.iter().map(|square| square.sqrt()).sum();
         (roots / (self.squares.len() as f64 * self.mean)).powi(2)
+    }
+
+    /// The fewest parts that have no more noise than this, or all.
+    fn coarse_as(mut self, noise: f64) -> Self {
+        let is_even = |level: &Self| level.mean <= 0.0 || level.noise() <= noise;
+        self.is_coarse &= !is_even(&self);
+        while self.columns > 1 {
+            let halved = self.halved();
+            if !is_even(&halved) {
+                break;
+            }
+            self = halved;
+        }
+        self
     }
 
     /// With four parts in one.
@@ -242,8 +287,8 @@ impl<'a> Textured<'a> {
         emitted * there
     }
 
-    /// The fewest parts that are even enough, or the most that there may be.
-    fn level(&self, most_asked: u32) -> Level {
+    /// With as many parts as there may be.
+    fn finest(&self, most_asked: u32) -> Level {
         let wanted = self.asked();
         let asked = wanted.min(most_asked);
         let factor = |number| self.factor(Part::numbered(number, asked).place(MIDDLE));
@@ -251,25 +296,14 @@ impl<'a> Textured<'a> {
         let squares: Vec<f64> = factors.iter().map(|factor| factor * factor).collect();
         let columns = asked / ASKED_A_PART;
         let most = (0..columns * columns).map(|number| self.most(Part::numbered(number, columns)).powi(2));
-        let mut level = Level {
+        let level = Level {
             columns,
             mean: factors.iter().sum::<f64>() / factors.len() as f64,
             squares: halved(&squares, asked),
             most: most.collect(),
-            is_coarse: false,
+            is_coarse: f64::from(columns.min(MOST_COLUMNS)) < self.texels().min(f64::from(wanted)) - 1e-3,
         };
-        level = level.coarsened(MOST_COLUMNS);
-        let most_columns = level.columns;
-        let is_even = |level: &Level| level.mean <= 0.0 || level.noise() <= EVEN_ENOUGH;
-        level.is_coarse = !is_even(&level) && f64::from(most_columns) < self.texels().min(f64::from(wanted)) - 1e-3;
-        while level.columns > 1 {
-            let halved = level.halved();
-            if !is_even(&halved) {
-                break;
-            }
-            level = halved;
-        }
-        level
+        level.coarsened(MOST_COLUMNS)
     }
 
     /// The largest factor that places of a part may have.
