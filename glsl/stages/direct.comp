@@ -257,7 +257,8 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
         if (emitter.light == NO_LIGHT) {
             return vec3(0.0);
         }
-        Light light = light_at(emitter.light);
+        uint index = by_bsdf ? light_at_place(emitter) : question.light;
+        Light light = light_at(index);
         Material material = material_of(emitter);
         vec3 to_light = emitter.position - position;
         float distance2 = dot(to_light, to_light);
@@ -271,11 +272,11 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
         radiance = there * emitted_radiance(material, abs(cos_light));
         if (IMMERSED) {
             // What is between them is what the light is in.
-            radiance *= transmittance(media_of_light(emitter.light).first, sqrt(distance2));
+            radiance *= transmittance(media_of_light(index).first, sqrt(distance2));
         }
         float probability = question.probability;
         if (by_bsdf) {
-            probability = probability_of_light(position, shading_normal, of_source, light_at_place(emitter));
+            probability = probability_of_light(position, shading_normal, of_source, index);
         }
         if (FEW_SOURCES && probability <= 0.0) {
             return vec3(0.0);

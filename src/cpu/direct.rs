@@ -285,17 +285,17 @@ fn sample_direct(
     } else {
         share_there(inputs.scene, &emitter)
     };
-    let light = &inputs.scene.lights[emitter.light as usize];
+    let index = asked_light.unwrap_or_else(|| light_at_place(&inputs.scene.lights, &emitter));
+    let light = &inputs.scene.lights[index as usize];
     let to_light = emitter.position - position;
     let direction = to_light.normalize_or_zero();
     let cos_light = -direction.dot(emitter.geometric_normal);
     if !emits(&emitter.material, cos_light > 0.0) || direction.dot(shading_normal) <= 0.0 || cos_light == 0.0 {
         return nothing;
     }
-    let radiance = there
-        * emitted_radiance(&emitter.material, cos_light.abs())
-        * between(emitter.light as usize, to_light.length());
-    let probability = probability_of(asked_light.unwrap_or_else(|| light_at_place(&inputs.scene.lights, &emitter)));
+    let radiance =
+        there * emitted_radiance(&emitter.material, cos_light.abs()) * between(index as usize, to_light.length());
+    let probability = probability_of(index);
     if source.is_some() && probability == 0.0 {
         return nothing;
     }
