@@ -460,6 +460,16 @@ device_structs! {
         pub rest: [u32; 4],
     }
 
+    /// Where a photon path starts.
+    pub struct PathStart: 48 {
+        /// xyz: position; w: u32 bits, the triangle that it leaves, u32::MAX for none.
+        pub origin_triangle: [f32; 4],
+        /// xyz: unit vector; w: 1 over the range of a punctual light, 0 where it reaches any distance.
+        pub direction_range: [f32; 4],
+        /// rgb: flux, not divided by the emitted paths, 0 of a path that isn't to be traced; w: u32 bits, the light.
+        pub flux_light: [f32; 4],
+    }
+
     /// A photon.
     pub struct Photon: 32 {
         /// xyz: position; w: u32 bits, object and [`CAUSTIC`].

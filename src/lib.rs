@@ -4,9 +4,9 @@
 //!
 //! [`scene::Scene::load`] reads a file, [`scene::PackedScene`] lays it out for the device. [`pipeline::Renderer`] uploads
 //! it and then repeats iterations, whose stages [`pipeline::Stages::iteration`] lists: `camera` finds visible points,
-//! `photons` traces photon paths, a method of [`gather::METHODS`] finds each visible point's photons, `direct` samples
-//! the lights, `update` shrinks the radii (the paper's equations 2 and 3). `resolve` makes the picture (equation 4), and
-//! [`film`] writes it.
+//! `emission` starts photon paths, `photons` traces them, a method of [`gather::METHODS`] finds each visible point's
+//! photons, `direct` samples the lights, `update` shrinks the radii (the paper's equations 2 and 3). `resolve` makes the
+//! picture (equation 4), and [`film`] writes it.
 //!
 //! [`record::Recording`] turns stages into commands with barriers; [`gpu`] alone knows Vulkan. [`cpu`] has each stage as
 //! a plain function. ARCHITECTURE.md walks through the rest.

@@ -38,6 +38,8 @@ pub enum BufferId {
     Environment,
     /// Where aimed photon paths start; see [`crate::emission::Table::texels`].
     EmissionTable,
+    /// [`crate::layout::PathStart`] of each photon path of a batch.
+    PathStarts,
     /// What each path of an iteration's first batch was worth, u32; see `glsl/stages/photons.comp`.
     PathValues,
     /// [`crate::layout::VisiblePoint`]s in slot order.

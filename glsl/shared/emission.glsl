@@ -1,17 +1,13 @@
 // Where photon paths start. Include after random.glsl, environment.glsl and light.glsl.
 
-// Paths are aimed at what was found to be worth it, or start in proportion to the lights' power.
-layout(constant_id = 24) const bool AIMED = false;
-
-#include "emission_table.glsl"
-
+#include "guide.glsl"
 struct Emission {
     vec3 origin;
     vec3 direction;
     vec3 flux;
     PlacedTriangle ignored; // the triangle that it leaves
     float inverse_range; // of a punctual light
-    Media media;         // that it starts in
+    uint light;
 };
 
 // What paths are to pass through.
@@ -37,23 +33,6 @@ vec3 direction_off(vec3 axis, float versine, float turn) {
     return normalize(basis(axis) * vec3(across * cos(phi), across * sin(phi), 1.0 - versine));
 }
 
-// The cone in which a sphere is seen.
-struct Cone {
-    vec3 axis;
-    float versine; // 1 − cos of the angle between its sides and the axis; 2 from inside the sphere
-};
-
-Cone cone_of(vec4 sphere, vec3 from) {
-    vec3 way = sphere.xyz - from;
-    float distance2 = dot(way, way);
-    float radius2 = sphere.w * sphere.w;
-    if (distance2 <= radius2) {
-        return Cone(vec3(0.0, 0.0, 1.0), 2.0);
-    }
-    float sin2 = radius2 / distance2;
-    return Cone(way * inversesqrt(distance2), sin2 / (1.0 + sqrt(max(0.0, 1.0 - sin2))));
-}
-
 // 1 − cos of a photon's angle from a spot's axis, such that all photons have the same flux, and the solid angle that would
 // have the whole intensity: the integral of the squared ramp is a third of its width.
 float spot_versine(PunctualLight light, float u, out float solid_angle) {
@@ -73,7 +52,7 @@ AimedStart emit_from_afar(vec3 towards, vec3 irradiance, float area, vec2 place,
     vec3 passed = target.sphere.xyz + basis(-towards) * vec3(radius * disc_point(place), 0.0);
     vec3 origin = passed + towards * (scene_radius - dot(target.sphere.xyz, towards));
     float disc = target.everything ? area : PI * radius * radius;
-    return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0, IN_VACUUM), passed, true, true);
+    return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0, 0u), passed, true, true);
 }
 
 AimedStart emit_directional(PunctualLight light, float area, vec2 place, vec2 turn, Target target) {
@@ -91,7 +70,7 @@ AimedStart emit_directional(PunctualLight light, float area, vec2 place, vec2 tu
         area = PI * radius * radius;
         origin -= light.direction * dot(passed - light.position, light.direction);
     }
-    return AimedStart(Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0, IN_VACUUM), passed, true, true);
+    return AimedStart(Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0, 0u), passed, true, true);
 }
 
 AimedStart emit_environment(float area, vec2 place, vec2 direction, Target target) {
@@ -133,7 +112,7 @@ AimedStart emit_point(PunctualLight light, uint kind, vec2 place, vec2 u, Target
         origin += basis(direction) * vec3(light.extent * disc_point(place), 0.0);
         on_target = false;
     }
-    return AimedStart(Emission(origin, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range, IN_VACUUM), origin, false,
+    return AimedStart(Emission(origin, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range, 0u), origin, false,
                       on_target);
 }
 
@@ -143,7 +122,7 @@ const float WIDE_CONE = 0.5;
 AimedStart emit_triangle(uint index, Light light, vec2 place, vec2 u, float side, Target target) {
     PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
     Surface emitter = surface_at(triangle, point_of_light(index, place));
-    Material material = material_of(emitter);
+    Material material = emitter_of(emitter);
     vec3 normal = emitter.geometric_normal;
     bool both_sides = emits(material, false);
     if (both_sides && side < 0.5) {
@@ -165,7 +144,7 @@ AimedStart emit_triangle(uint index, Light light, vec2 place, vec2 u, float side
     }
     vec3 flux = emitted_radiance(material, max(0.0, dot(direction, normal))) *
                 (projected * sides * light.area * share_there(emitter));
-    return AimedStart(Emission(origin, direction, flux, triangle, 0.0, IN_VACUUM), origin, false, in_cone);
+    return AimedStart(Emission(origin, direction, flux, triangle, 0.0, 0u), origin, false, in_cone);
 }
 
 // From a light towards a target; flux over the density of the coordinates' choice.
@@ -184,39 +163,13 @@ AimedStart emit_from(uint index, vec2 place, vec2 direction, float side, Target 
     return emit_triangle(index, light, place, direction, side, target);
 }
 
-// A sphere that is seen within less than this, sin² of its cone's angle, is worth aiming at from a matte surface.
-const float NARROW_CONE = 0.25;
-
-// From a matte surface outside of what the camera sees hardly a photon finds there, and those that do carry the flux of all:
-// half of them are aimed there. Gives the direction in place of the cosine's, and what the flux is to be weighed with: cosine
-// over the density of both ways together, at most 2.
-float guide(vec3 position, vec3 normal, vec4 u, inout vec3 outgoing) {
-    EmissionTableSize size = emission_table_size();
-    if (size.view >= size.targets) {
-        return 1.0;
-    }
-    vec4 sphere = target_sphere(size.view);
-    vec3 way = sphere.xyz - position;
-    if (sphere.w * sphere.w >= NARROW_CONE * dot(way, way) || dot(way, normal) <= -sphere.w) {
-        return 1.0;
-    }
-    Cone cone = cone_of(sphere, position);
-    bool aimed = u.w < 0.5;
-    outgoing = aimed ? direction_in_cone(cone.axis, cone.versine, u.xy) : outgoing;
-    vec3 off = outgoing - cone.axis;
-    bool inside = aimed || 0.5 * dot(off, off) <= cone.versine;
-    float by_cosine = max(0.0, dot(outgoing, normal)) / PI;
-    float by_aim = inside ? 1.0 / (2.0 * PI * cone.versine) : 0.0;
-    return by_cosine > 0.0 ? 2.0 * by_cosine / (by_cosine + by_aim) : 0.0;
-}
-
 // A path without flux where another target comes before the one that it was chosen for.
 Emission emit_aimed(vec4 u, vec4 w) {
     EmissionTableSize size = emission_table_size();
     Start start = choose_start(size, u, w);
     if (start.weight == 0.0) {
         // Not to be traced, see emission::Aim.
-        return Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0, IN_VACUUM);
+        return Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0, 0u);
     }
     Target target = EVERYTHING;
     if (start.target < size.targets) {
@@ -224,7 +177,7 @@ Emission emit_aimed(vec4 u, vec4 w) {
     }
     AimedStart aimed = emit_from(start.light, start.place, start.direction, w.y, target);
     Emission emission = aimed.emission;
-    emission.media = media_of_light(start.light);
+    emission.light = start.light;
     bool kept = meets_first(size, start.target, aimed.on_target, aimed.passed, emission.direction, aimed.from_afar);
     emission.flux *= kept ? start.weight / start.probability : 0.0;
     return emission;
@@ -240,6 +193,6 @@ Emission emit(inout Random random) {
     Choice choice = choose_light(u.x, w.xz);
     Emission emission = emit_from(choice.index, vec2(choice.rest, u.y), u.zw, w.y, EVERYTHING).emission;
     emission.flux /= light_at(choice.index).probability;
-    emission.media = media_of_light(choice.index);
+    emission.light = choice.index;
     return emission;
 }

@@ -256,6 +256,8 @@ struct Hit {
     uint instance; // NO_INSTANCE where the triangle is in render space
 };
 
+const Hit NO_HIT = Hit(0.0, 0.0, 0.0, MISS, NO_INSTANCE);
+
 PlacedTriangle triangle_of(Hit hit) {
     return PlacedTriangle(hit.triangle, hit.instance);
 }

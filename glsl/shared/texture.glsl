@@ -202,6 +202,26 @@ Material material_of(inout Surface surface) {
     return material;
 }
 
+// Of a surface's material what its emission depends on, at its place.
+Material emitter_of(Surface surface) {
+    Material material = material_at(surface.material);
+    bool textured = TEXTURED && (surface.flags & TEXTURED_TRIANGLE) != 0u;
+    if (textured) {
+        Place place = place_at(surface.triangle, surface.uv);
+        uint emission = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 5u).w;
+        if (emission != NO_TEXTURE) {
+            material.emission *= texture_value(emission, place).rgb;
+        }
+        if (CLEARCOAT) {
+            uint coat = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 8u).z;
+            if (coat != NO_TEXTURE) {
+                material.coat *= texture_value(coat, place).r;
+            }
+        }
+    }
+    return material;
+}
+
 // The part of a surface that is there, at its place.
 float share_there(Surface surface) {
     bool see_through = ALPHA && (surface.flags & SEE_THROUGH) != 0u;

@@ -21,9 +21,9 @@ layout(local_size_x = 64) in;
 #include "media.glsl"
 #include "contact.glsl"
 #include "encounter.glsl"
-#include "environment.glsl"
 #include "light.glsl"
-#include "emission.glsl"
+#include "guide.glsl"
+#include "path_start.glsl"
 #include "photon.glsl"
 #include "grid.glsl"
 #include "demand.glsl"
@@ -32,16 +32,9 @@ layout(local_size_x = 64) in;
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
 layout(constant_id = 25) const bool DROP_UNWANTED = true; // photons that no visible point can accept aren't stored
 
-layout(push_constant) uniform Push {
-    uint iteration;
-    uint block;          // see config::RenderConfig::block_of
-    uint first_of_sequence; // paths of the block before this iteration, of its sequence
-    uint first_path;     // of this batch
-    uint path_count;
-} push;
-
 layout(std430) readonly buffer Grid { GridShape grid; };
 uniform usamplerBuffer Demand;
+uniform usamplerBuffer PathStarts;
 layout(std430) writeonly buffer LanePhotons { Photon lane_photons[]; };
 layout(std430) writeonly buffer LaneCounts { uint lane_counts[]; };
 layout(std430) writeonly buffer LaneOffsets { uint lane_offsets[]; }; // the same, to be summed up
@@ -60,19 +53,21 @@ struct Path {
     float inverse_range; // of the light, until the first surface
 };
 
-Path start(inout Random random) {
-    Emission emission = emit(random);
+Path path_from(uint start) {
+    vec4 origin_triangle = TEXEL(PathStarts, 3u * start);
+    vec4 direction_range = TEXEL(PathStarts, 3u * start + 1u);
+    vec4 flux_light = TEXEL(PathStarts, 3u * start + 2u);
     Path path;
-    path.origin = emission.origin;
-    path.direction = emission.direction;
-    path.flux = emission.flux;
+    path.origin = origin_triangle.xyz;
+    path.direction = direction_range.xyz;
+    path.flux = flux_light.rgb;
     path.depth = 0u;
-    path.ignored = emission.ignored;
-    path.media = emission.media;
+    path.ignored = PlacedTriangle(floatBitsToUint(origin_triangle.w), NO_INSTANCE);
+    path.media = media_of_light(floatBitsToUint(flux_light.w));
     path.wavelength = 0.0;
     path.seen_directly = true;
     path.caustic = true;
-    path.inverse_range = emission.inverse_range;
+    path.inverse_range = direction_range.w;
     return path;
 }
 
@@ -119,148 +114,139 @@ void main() {
     uint truncated = 0u;
     uint non_finite = 0u;
     bool finished = false;
-    while (!loops_cut) {
+    while (!finished && !loops_cut) {
         loop_count += 1u;
         if (!alive) {
             if (next > lane) {
                 note_value(next - settings.photon_lanes, value, rays);
             }
-            if (next >= push.path_count) {
-                finished = true;
-                break;
-            }
-            random = random_of_photon(push.first_path + next, push.iteration, push.block, push.first_of_sequence,
-                                      settings.seed);
-            path = start(random);
-            value = 0.0;
-            rays = 0u;
-            next += settings.photon_lanes;
-            alive = largest(path.flux) > 0.0;
-            if (!alive) {
-                continue;
+            finished = next >= push.path_count;
+            if (!finished) {
+                random = random_of_path(next);
+                random.dimension = START_NUMBERS;
+                path = path_from(next);
+                value = 0.0;
+                rays = 0u;
+                next += settings.photon_lanes;
+                alive = largest(path.flux) > 0.0;
             }
         }
-        rays += 1u;
-        Hit hit = trace_visible(path.origin, path.direction, AT_ORIGIN, 1e30, path.ignored, false, random);
-        if (loops_cut) {
-            break;
+        Hit hit = NO_HIT;
+        if (alive) {
+            rays += 1u;
+            hit = trace_visible(path.origin, path.direction, AT_ORIGIN, 1e30, path.ignored, false, random);
         }
         if (hit.triangle == MISS) {
-            alive = false;
-            continue;
-        }
-        vec3 incoming = path.direction;
-        Encounter met = encounter(hit, incoming, path.media, false, random);
-        Surface surface = met.surface;
-        Material material = met.material;
-        Facing facing = met.facing;
-        if (ABSORPTION) {
-            path.flux *= transmittance(met.through.first, hit.t);
-        }
-        if (PUNCTUAL_LIGHTS) {
-            // A range is how far the light itself reaches, not what it lights.
-            path.flux *= range_window(path.inverse_range, hit.t);
-            path.inverse_range = 0.0;
-        }
-        if (largest(path.flux) <= 0.0) {
-            alive = false;
-            continue;
-        }
-        if (met.hidden) {
-            path.flux *= met.tint;
-            path.media = met.beyond;
-            // No ray to a light passes it.
-            path.seen_directly = false;
-            path.origin = origin_towards(surface, path.direction);
-            path.ignored = surface.triangle;
-            continue;
-        }
-        vec4 u = next4(random);
-        bool stores = choose_part(material, u.w) || is_matte(material) || is_glossy(material) ||
-                      (is_coated(material) && material.coat_roughness * material.coat_roughness >= FOLLOWED_ALPHA);
-        vec3 landing = path.flux;
-        if (stores) {
-            landing *= landing_correction(facing, incoming);
-            if (!finite(landing)) {
-                non_finite += 1u;
-            } else if (!(SAMPLE_LIGHTS && path.seen_directly)) {
-                landed += 1u;
-                uint map = settings.photon_maps > 1u && path.caustic && !path.seen_directly ? 1u : 0u;
-                float wanted = 1.0;
-                if (DROP_UNWANTED) {
-                    wanted = demand_at(surface.position, surface.object, map);
-                }
-                if (wanted > 0.0) {
-                    float flux = (landing.r + landing.g + landing.b) * (1.0 / 3.0);
-                    value = min(value + wanted * flux * flux, 1e37);
-                    if (stored < settings.lane_capacity) {
-                        Photon photon;
-                        photon.position_object = vec4(surface.position, uintBitsToFloat(surface.object | map << 31u));
-                        vec3 flux_there = landing;
-                        if (has_coat(surface.material)) {
-                            // Across the ray: a coat has another shading normal than what lies below it.
-                            flux_there = path.flux / -dot(incoming, facing.geometric_normal);
+            alive = alive && loops_cut;
+        } else if (!loops_cut) {
+            vec3 incoming = path.direction;
+            Encounter met = encounter(hit, incoming, path.media, false, random);
+            Material material = met.material;
+            if (ABSORPTION) {
+                path.flux *= transmittance(met.through.first, hit.t);
+            }
+            if (PUNCTUAL_LIGHTS) {
+                // A range is how far the light itself reaches, not what it lights.
+                path.flux *= range_window(path.inverse_range, hit.t);
+                path.inverse_range = 0.0;
+            }
+            alive = largest(path.flux) > 0.0;
+            bool hidden = NESTED && met.hidden;
+            if (NESTED && hidden) {
+                path.flux *= met.tint;
+                path.media = met.beyond;
+                // No ray to a light passes it.
+                path.seen_directly = false;
+            } else if (alive) {
+                vec4 u = next4(random);
+                bool stores = choose_part(material, u.w) || is_matte(material) || is_glossy(material) ||
+                              (is_coated(material) && material.coat_roughness * material.coat_roughness >= FOLLOWED_ALPHA);
+                vec3 landing = path.flux;
+                if (stores) {
+                    landing *= landing_correction(met.facing, incoming);
+                    if (!finite(landing)) {
+                        non_finite += 1u;
+                    } else if (!(SAMPLE_LIGHTS && path.seen_directly)) {
+                        landed += 1u;
+                        uint map = settings.photon_maps > 1u && path.caustic && !path.seen_directly ? 1u : 0u;
+                        float wanted = 1.0;
+                        if (DROP_UNWANTED) {
+                            wanted = demand_at(met.surface.position, met.surface.object, map);
                         }
-                        // What is there in part is seen in part as well as met in part.
-                        photon.flux_direction =
-                            vec4(flux_there / met.share, uintBitsToFloat(encode_direction(incoming)));
-                        lane_photons[stored * settings.photon_lanes + lane] = photon;
+                        if (wanted > 0.0) {
+                            float flux = (landing.r + landing.g + landing.b) * (1.0 / 3.0);
+                            value = min(value + wanted * flux * flux, 1e37);
+                            if (stored < settings.lane_capacity) {
+                                Photon photon;
+                                photon.position_object =
+                                    vec4(met.surface.position, uintBitsToFloat(met.surface.object | map << 31u));
+                                vec3 flux_there = landing;
+                                if (has_coat(met.surface.material)) {
+                                    // Across the ray: a coat has another shading normal than what lies below it.
+                                    flux_there = path.flux / -dot(incoming, met.facing.geometric_normal);
+                                }
+                                // What is there in part is seen in part as well as met in part.
+                                photon.flux_direction =
+                                    vec4(flux_there / met.share, uintBitsToFloat(encode_direction(incoming)));
+                                lane_photons[stored * settings.photon_lanes + lane] = photon;
+                            }
+                            stored += 1u;
+                        }
                     }
-                    stored += 1u;
+                }
+                path.seen_directly = false;
+                float layer = 1.0;
+                if (is_coated(material)) {
+                    layer = choose_layer(material, met.facing, met.surface, incoming, next4(random).x);
+                    landing = path.flux * (layer * landing_correction(met.facing, incoming));
+                }
+                if (is_matte(material) || is_glossy(material)) {
+                    path.caustic = false;
+                    // Drawn around the geometric normal, the outgoing direction needs no second correction.
+                    vec3 outgoing = cosine_direction(met.facing.geometric_normal, u.xy);
+                    float guided = 1.0;
+                    if (AIMED && is_matte(material)) {
+                        guided = guide(met.surface.position, met.facing.geometric_normal, u, outgoing);
+                    }
+                    vec3 scattered = landing * material.base_color;
+                    if (is_glossy(material)) {
+                        scattered = landing * scatter(reflector_of(material), met.facing, -incoming, u, outgoing);
+                    }
+                    alive = dot(outgoing, met.facing.shading_normal) > 0.0 && finite(scattered) &&
+                            survives(path.flux, scattered, u.z);
+                    // Those that are aimed shall come there, with less flux each.
+                    path.flux *= guided;
+                    alive = alive && guided > 0.0;
+                    path.direction = outgoing;
+                } else if (is_mirror(material)) {
+                    float cos_i = -dot(incoming, met.facing.shading_normal);
+                    if (is_coated(material)) {
+                        layer *= coat_passes(material.coat, cos_i);
+                    }
+                    alive = survives(path.flux, path.flux * layer * fresnel_schlick(material.base_color, cos_i), u.z);
+                    path.direction = mirror_direction(met.facing, incoming);
+                } else if (DIELECTRICS) {
+                    if (DISPERSION) {
+                        path.flux *= disperse(material, path.wavelength, random);
+                    }
+                    Boundary boundary = meet_boundary(met.facing, incoming, material, met.outside, u.yw);
+                    bool reflected = u.x < boundary.reflectance;
+                    vec3 weight = reflected ? boundary.reflected_weight : met.tint * boundary.refracted_weight;
+                    alive = survives(path.flux, path.flux * (layer * weight), u.z);
+                    path.direction = reflected ? boundary.reflected : boundary.refracted;
+                    path.media = met.beyond;
+                    if (reflected) {
+                        path.media = met.through;
+                    }
                 }
             }
-        }
-        path.seen_directly = false;
-        float layer = 1.0;
-        if (is_coated(material)) {
-            layer = choose_layer(material, facing, surface, incoming, next4(random).x);
-            landing = path.flux * (layer * landing_correction(facing, incoming));
-        }
-        if (is_matte(material) || is_glossy(material)) {
-            path.caustic = false;
-            // Drawn around the geometric normal, the outgoing direction needs no second correction.
-            vec3 outgoing = cosine_direction(facing.geometric_normal, u.xy);
-            float guided = 1.0;
-            if (AIMED && is_matte(material)) {
-                guided = guide(surface.position, facing.geometric_normal, u, outgoing);
+            path.origin = origin_towards(met.surface, path.direction);
+            path.ignored = met.surface.triangle;
+            path.depth += hidden ? 0u : 1u;
+            if (alive && path.depth >= settings.max_depth) {
+                truncated += 1u;
+                alive = false;
             }
-            vec3 scattered = landing * material.base_color;
-            if (is_glossy(material)) {
-                scattered = landing * scatter(reflector_of(material), facing, -incoming, u, outgoing);
-            }
-            alive = dot(outgoing, facing.shading_normal) > 0.0 && finite(scattered) &&
-                    survives(path.flux, scattered, u.z);
-            // Those that are aimed shall come there, with less flux each.
-            path.flux *= guided;
-            alive = alive && guided > 0.0;
-            path.direction = outgoing;
-        } else if (is_mirror(material)) {
-            float cos_i = -dot(incoming, facing.shading_normal);
-            if (is_coated(material)) {
-                layer *= coat_passes(material.coat, cos_i);
-            }
-            alive = survives(path.flux, path.flux * layer * fresnel_schlick(material.base_color, cos_i), u.z);
-            path.direction = mirror_direction(facing, incoming);
-        } else if (DIELECTRICS) {
-            if (DISPERSION) {
-                path.flux *= disperse(material, path.wavelength, random);
-            }
-            Boundary boundary = meet_boundary(facing, incoming, material, met.outside, u.yw);
-            bool reflected = u.x < boundary.reflectance;
-            vec3 weight = reflected ? boundary.reflected_weight : met.tint * boundary.refracted_weight;
-            alive = survives(path.flux, path.flux * (layer * weight), u.z);
-            path.direction = reflected ? boundary.reflected : boundary.refracted;
-            path.media = met.beyond;
-            if (reflected) {
-                path.media = met.through;
-            }
-        }
-        path.origin = origin_towards(surface, path.direction);
-        path.ignored = surface.triangle;
-        path.depth += 1u;
-        if (alive && path.depth >= settings.max_depth) {
-            truncated += 1u;
-            alive = false;
         }
     }
     uint kept = min(stored, settings.lane_capacity);

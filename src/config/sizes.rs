@@ -2,8 +2,8 @@
 
 use super::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
-    BehindGlass, Coverage, DirectSum, EmissionCell, Gathered, Gloss, GridShape, Photon, SHELLS, ShellRadii, Statistics,
-    StatusCounters, VisiblePoint,
+    BehindGlass, Coverage, DirectSum, EmissionCell, Gathered, Gloss, GridShape, PathStart, Photon, SHELLS, ShellRadii,
+    Statistics, StatusCounters, VisiblePoint,
 };
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
 
@@ -238,6 +238,7 @@ impl Sizes {
             BufferId::GatheredOf => (receivers, size_of::<Gathered>()),
             BufferId::DirectSums => (slots, size_of::<DirectSum>()),
             id if SEQUENCE_SUMS.contains(&id) => (slots, 16),
+            BufferId::PathStarts => (u64::from(self.batch_paths), size_of::<PathStart>()),
             BufferId::CoverageOf => (receivers, size_of::<Coverage>()),
             BufferId::TestsOf => (if self.probe.count_tests { receivers } else { 1 }, 4),
             BufferId::Footprints => (slots, 4),

@@ -180,14 +180,15 @@ impl Stages<'_> {
     /// Photon tracing alone, of so many paths of an iteration.
     pub(super) fn trace_paths(&self, iteration: u32, paths: Range<u32>, recording: &mut Recording) {
         let lanes = self.sizes.photon_lanes;
-        let block = self.config.block_of(iteration);
-        recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push([
+        let push = [
             iteration,
-            block,
+            self.config.block_of(iteration),
             self.config.first_of_sequence(iteration),
             paths.start,
             paths.len() as u32,
-        ]));
+        ];
+        recording.dispatch(self.ray_stage(&shaders::EMISSION, paths.len() as u32).push(push));
+        recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push(push));
     }
 
     /// A stage that traces rays.

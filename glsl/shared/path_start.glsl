@@ -1,0 +1,24 @@
+// Photon paths as `emission` leaves them to `photons`. Include after random.glsl and settings.glsl.
+
+layout(push_constant) uniform Push {
+    uint iteration;
+    uint block;             // see config::RenderConfig::block_of
+    uint first_of_sequence; // paths of the block before this iteration, of its sequence
+    uint first_path;        // of this batch
+    uint path_count;
+} push;
+
+// Mirrors `layout::PathStart`.
+struct PathStart {
+    vec4 origin_triangle;    // w: uint bits, the triangle that it leaves
+    vec4 direction_range;    // w: 1 over the range of a punctual light, 0 where it reaches any distance
+    vec4 flux_light;         // rgb: flux, 0 of a path that isn't to be traced; w: uint bits, the light
+};
+
+// Quadruples of its numbers that choose a path's start.
+const uint START_NUMBERS = 2u;
+
+// Of a path of the batch.
+Random random_of_path(uint path) {
+    return random_of_photon(push.first_path + path, push.iteration, push.block, push.first_of_sequence, settings.seed);
+}

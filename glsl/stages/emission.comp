@@ -1,0 +1,35 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Starts photon paths on the lights. Apart from `photons`, which would need its registers while it traces.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "settings.glsl"
+#include "sampling.glsl"
+#include "gloss.glsl"
+#include "random.glsl"
+#include "texel.glsl"
+#include "scene.glsl"
+#include "texture.glsl"
+#include "bsdf.glsl"
+#include "media.glsl"
+#include "environment.glsl"
+#include "light.glsl"
+#include "emission.glsl"
+#include "path_start.glsl"
+#include "status.glsl"
+
+layout(std430) writeonly buffer PathStarts { PathStart path_starts[]; };
+
+void main() {
+    uint path = invocation_index();
+    if (path >= push.path_count || status.again != 0u) {
+        return;
+    }
+    Random random = random_of_path(path);
+    Emission emission = emit(random);
+    path_starts[path] = PathStart(vec4(emission.origin, uintBitsToFloat(emission.ignored.triangle)),
+                                  vec4(emission.direction, emission.inverse_range),
+                                  vec4(emission.flux, uintBitsToFloat(emission.light)));
+}
