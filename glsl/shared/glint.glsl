@@ -41,49 +41,73 @@ vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outs
     return boundary.refracted_weight * ((1.0 - boundary.reflectance) * visible * through * masking(alpha, -nl));
 }
 
-// By a ray to one of the lights or, where visible points are found once, to each. `reflector`: of what isn't glass.
-vec3 glint(Encounter met, Material material, Facing facing, Reflector reflector, vec3 viewer, Random random) {
-    // Apart from the path's own numbers: those are the same where there is nothing to ask.
-    vec3 u = vec3(number_of(random, uvec2(0u, GLINT)), number_of(random, uvec2(1u, GLINT)),
-                  number_of(random, uvec2(2u, GLINT)));
-    uint chosen = choose_light(u.x, u.yz).index;
-    vec2 place = vec2(0.0);
-    if (SOFT_LIGHTS) {
-        place = vec2(number_of(random, uvec2(3u, GLINT)), number_of(random, uvec2(4u, GLINT)));
+// A ray that asks whether a light is seen, and what it brings if it is.
+struct LightRay {
+    vec3 origin;
+    vec3 direction;
+    float end; // in its lengths
+    vec3 contribution;
+};
+
+const LightRay NO_LIGHT_RAY = LightRay(vec3(0.0), vec3(0.0), 0.0, vec3(0.0));
+
+bool asks_light(LightRay ray) {
+    return PUNCTUAL_LIGHTS && largest(ray.contribution) > 0.0;
+}
+
+// What a surface shows of a light. `reflector`: of what isn't glass.
+LightRay glint(uint index, vec2 place, Encounter met, Material material, Reflector reflector, vec3 viewer) {
+    Light light = light_at(index);
+    if (!is_punctual(light.kind)) {
+        return NO_LIGHT_RAY;
     }
-    bool of_one = settings.slots_per_pixel == 1u;
-    uint begin = of_one ? chosen : 0u;
-    uint end = of_one ? chosen + 1u : settings.light_count;
-    reflector.diffuse = vec3(0.0);
+    PunctualLight lamp = punctual_light_at(index);
+    vec3 origin = origin_towards(met.surface, arriving_from(lamp, light.kind, met.surface.position, place).ray);
+    Arriving arriving = arriving_from(lamp, light.kind, origin, place);
+    vec3 l = normalize(arriving.ray);
+    float nl = dot(l, met.facing.shading_normal);
+    bool same_side = dot(l, met.facing.geometric_normal) > 0.0;
+    vec3 response = vec3(0.0);
+    if (is_dielectric(material)) {
+        response = glass_response(met.facing, viewer, l, material, met.outside) * (same_side ? vec3(1.0) : met.tint);
+    } else if (same_side && nl > 0.0) {
+        reflector.diffuse = vec3(0.0);
+        response = brdf(reflector, met.facing.shading_normal, viewer, l) * nl;
+    }
+    if (ABSORPTION) {
+        float way = light.kind == DIRECTIONAL_LIGHT ? 1e30 : length(arriving.ray);
+        response *= transmittance(same_side ? met.through.first : met.beyond.first, way);
+    }
+    return LightRay(origin, arriving.ray, arriving.end, response * arriving.irradiance);
+}
+
+// Numbers for a glint, apart from the path's own: those are the same where there is nothing to ask.
+float glint_number(Random random, uint i) {
+    return number_of(random, uvec2(i, GLINT));
+}
+
+vec2 glint_place(Random random) {
+    return SOFT_LIGHTS ? vec2(glint_number(random, 3u), glint_number(random, 4u)) : vec2(0.0);
+}
+
+LightRay glint_of_one(Encounter met, Material material, Reflector reflector, vec3 viewer, Random random) {
+    vec2 digits = vec2(glint_number(random, 1u), glint_number(random, 2u));
+    uint chosen = choose_light(glint_number(random, 0u), digits).index;
+    LightRay ray = glint(chosen, glint_place(random), met, material, reflector, viewer);
+    ray.contribution *= 1.0 / light_at(chosen).probability;
+    return ray;
+}
+
+// By a ray to each light, where visible points are found once.
+vec3 glint_of_all(Encounter met, Material material, Reflector reflector, vec3 viewer, Random random) {
     vec3 sum = vec3(0.0);
     // Triangles come first, and may be many.
-    for (uint i = end; i > begin && light_at(i - 1u).kind != TRIANGLE_LIGHT && !loops_cut; i--) {
-        Light light = light_at(i - 1u);
-        if (!is_punctual(light.kind)) {
-            continue;
+    for (uint i = settings.light_count; i > 0u && light_at(i - 1u).kind != TRIANGLE_LIGHT && !loops_cut; i--) {
+        LightRay ray = glint(i - 1u, glint_place(random), met, material, reflector, viewer);
+        if (asks_light(ray)) {
+            Hit hit = trace_visible(ray.origin, ray.direction, AT_ORIGIN, ray.end, NO_TRIANGLE, true, random);
+            sum += hit.triangle == MISS ? ray.contribution : vec3(0.0);
         }
-        PunctualLight lamp = punctual_light_at(i - 1u);
-        vec3 origin = origin_towards(met.surface, arriving_from(lamp, light.kind, met.surface.position, place).ray);
-        Arriving arriving = arriving_from(lamp, light.kind, origin, place);
-        vec3 l = normalize(arriving.ray);
-        float nl = dot(l, facing.shading_normal);
-        bool same_side = dot(l, facing.geometric_normal) > 0.0;
-        vec3 response = vec3(0.0);
-        if (is_dielectric(material)) {
-            response = glass_response(facing, viewer, l, material, met.outside) * (same_side ? vec3(1.0) : met.tint);
-        } else if (same_side && nl > 0.0) {
-            response = brdf(reflector, facing.shading_normal, viewer, l) * nl;
-        }
-        if (ABSORPTION) {
-            float way = light.kind == DIRECTIONAL_LIGHT ? 1e30 : length(arriving.ray);
-            response *= transmittance(same_side ? met.through.first : met.beyond.first, way);
-        }
-        response *= arriving.irradiance / (of_one ? light.probability : 1.0);
-        bool seen = largest(response) > 0.0;
-        if (seen) {
-            seen = trace_visible(origin, arriving.ray, AT_ORIGIN, arriving.end, NO_TRIANGLE, true, random).triangle == MISS;
-        }
-        sum += seen ? response : vec3(0.0);
     }
     return sum;
 }

@@ -52,7 +52,6 @@ struct Branch {
     Media media;          // that it is in
     float wavelength;     // nm; 0: of all
     bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
-    bool emission_seen;   // what the next surface emits
     bool lamps_seen;      // what lights with an extent send along the ray
 };
 
@@ -69,33 +68,35 @@ float way_of(Hit hit) {
     return hit.triangle == MISS ? 1e30 : hit.t;
 }
 
-// The first surface on a ray's way.
-struct Glimpse {
-    vec3 emission;
-    bool dark; // nothing is there that scatters light
-};
+// What passes a boundary waits while the path looks at what the boundary reflects, before it chooses which of both to follow: a
+// lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck. It waits in shared memory, a place for
+// each invocation, since registers are scarce where rays are traced.
+shared vec3 passing_origin[64];
+shared vec3 passing_direction[64];
+shared vec3 passing_throughput[64];
+shared uint passing_medium[64];
+shared uvec3 passing_other_media[64]; // NESTED
 
-Glimpse glimpse(vec3 origin, vec3 direction, PlacedTriangle ignored, Media media, bool lamps_seen, Random random) {
-    Hit hit = trace_visible(origin, direction, AT_ORIGIN, 1e30, ignored, false, random);
-    if (loops_cut) {
-        return Glimpse(vec3(0.0), true);
+void let_wait(vec3 origin, vec3 direction, vec3 throughput, Media media) {
+    uint place = gl_LocalInvocationIndex;
+    passing_origin[place] = origin;
+    passing_direction[place] = direction;
+    passing_throughput[place] = throughput;
+    passing_medium[place] = media.first;
+    if (NESTED) {
+        passing_other_media[place] = media.others;
     }
-    vec3 lamps = vec3(0.0);
-    if (SOFT_LIGHTS && !lamps_seen) {
-        lamps = soft_lights_along(origin, direction, way_of(hit), media.first);
+}
+
+void take_what_waits(inout Branch branch) {
+    uint place = gl_LocalInvocationIndex;
+    branch.origin = passing_origin[place];
+    branch.direction = passing_direction[place];
+    branch.throughput = passing_throughput[place];
+    branch.media.first = passing_medium[place];
+    if (NESTED) {
+        branch.media.others = passing_other_media[place];
     }
-    if (hit.triangle == MISS) {
-        return Glimpse(radiance_from_afar(direction) + lamps, true);
-    }
-    Encounter met = encounter(hit, direction, media, false, random);
-    bool dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
-    vec3 emission = emits(met.material, met.facing.front)
-                        ? emitted_radiance(met.material, -dot(direction, met.facing.geometric_normal))
-                        : vec3(0.0);
-    if (ABSORPTION) {
-        emission *= transmittance(met.through.first, hit.t);
-    }
-    return Glimpse(emission + lamps, dark);
 }
 
 // Follows what a boundary of microfacets reflects, or none of it where that would fly into the surface.
@@ -123,6 +124,8 @@ void main() {
     vec4 u = next4(random);
     vec2 film = (vec2(pixel) + (JITTER ? u.xy : vec2(0.5))) / vec2(settings.resolution) * 2.0 - 1.0;
 
+    uint slots_of_pixel = SLOTS;
+    bool many = slots_of_pixel > 1u;
     Branch pending[SLOTS];
     uint pending_count = 0u;
     uint used = 0u;
@@ -151,200 +154,228 @@ void main() {
     }
     branch.wavelength = 0.0;
     branch.reflection_seen = false;
-    branch.emission_seen = false;
     branch.lamps_seen = false;
 
+    // Reflectance of a boundary that something which passes it waits for; negative where the reflection won't be followed.
+    float waits = 0.0;
+    LightRay light_ray = NO_LIGHT_RAY;
     bool alive = inside;
+    bool ended = false;
     bool cut = false;
     bool met_surface = false;
+    bool found = false; // a visible point
     Progress progress = AT_ORIGIN; // past backs that no camera sees
-    VisiblePoint visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
-    Gloss gloss = Gloss(vec4(0.0), uvec4(0u));
     while (alive) {
         loop_count += 1u;
-        bool ended = true;
-        visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
-        Hit hit = trace_visible(branch.origin, branch.direction, progress, 1e30, branch.ignored, false, random);
-        if (SOFT_LIGHTS && !loops_cut && !branch.lamps_seen && !branch.emission_seen) {
-            vec3 from = branch.origin + progress.t * branch.direction;
-            branch.emitted += branch.throughput * soft_lights_along(from, branch.direction, way_of(hit) - progress.t,
-                                                                    branch.media.first);
-        }
+        uint slot = pixel_slot * SLOTS + used;
+        // A path's rays are all traced here, since the traversal is compiled as often as it is called.
+        bool asks = asks_light(light_ray);
+        vec3 origin = asks ? light_ray.origin : branch.origin;
+        vec3 direction = asks ? light_ray.direction : branch.direction;
+        PlacedTriangle ignored = PlacedTriangle(asks ? MISS : branch.ignored.triangle, branch.ignored.instance);
+        Hit hit = trace_visible(origin, direction, progress, asks ? light_ray.end : 1e30, ignored, asks, random);
+        bool missed = hit.triangle == MISS;
         if (loops_cut) {
             cut = true;
-        } else if (hit.triangle != MISS) {
+            ended = true;
+            light_ray = NO_LIGHT_RAY;
+        } else if (asks) {
+            branch.emitted += missed ? light_ray.contribution : vec3(0.0);
+            light_ray = NO_LIGHT_RAY;
+        } else {
             bool culls = CULLING && branch.depth == 0u;
-            Encounter met = encounter(hit, branch.direction, branch.media, culls, random);
-            Surface surface = met.surface;
-            Material material = met.material;
-            Facing facing = met.facing;
-            if (culls && is_hidden_back(surface, material, branch.direction)) {
-                progress = past(hit);
-                continue;
+            vec3 seen = vec3(0.0); // radiance along the ray
+            bool dark = missed;    // nothing is there that scatters light
+            if (SOFT_LIGHTS && !branch.lamps_seen) {
+                vec3 from = branch.origin + progress.t * branch.direction;
+                seen = soft_lights_along(from, branch.direction, way_of(hit) - progress.t, branch.media.first);
+            }
+            Encounter met;
+            if (missed) {
+                seen += radiance_from_afar(branch.direction);
+            } else {
+                met = encounter(hit, branch.direction, branch.media, culls, random);
+                if (CULLING && culls && is_hidden_back(met.surface, met.material, branch.direction)) {
+                    branch.emitted += branch.throughput * seen;
+                    progress = past(hit);
+                    continue;
+                }
+                vec3 kept = vec3(1.0);
+                if (ABSORPTION) {
+                    kept = transmittance(met.through.first, hit.t);
+                }
+                if (!met.hidden && emits(met.material, met.facing.front)) {
+                    seen += kept * emitted_radiance(met.material, -dot(branch.direction, met.facing.geometric_normal));
+                }
+                dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
             }
             progress = AT_ORIGIN;
-            branch.way += hit.t;
-            if (ABSORPTION) {
-                branch.throughput *= transmittance(met.through.first, hit.t);
+            bool goes_on = true;
+            branch.emitted += branch.throughput * seen;
+            if (DIELECTRICS && waits != 0.0) {
+                bool passes = dark || waits < 0.0;
+                float reflectance = abs(waits);
+                waits = 0.0;
+                branch.throughput *= 1.0 / reflectance;
+                goes_on = !passes;
+                if (passes) {
+                    take_what_waits(branch);
+                    // In the dark that was all there is to the reflection.
+                    branch.throughput *= dark ? 1.0 - reflectance : 1.0;
+                }
             }
-            if (met.hidden) {
-                branch.throughput *= met.tint;
-                branch.media = met.beyond;
-                branch.emission_seen = false;
+            if (goes_on && missed) {
+                ended = true;
+            } else if (goes_on) {
+                branch.way += hit.t;
+                if (ABSORPTION) {
+                    branch.throughput *= transmittance(met.through.first, hit.t);
+                }
+                branch.ignored = met.surface.triangle;
                 branch.lamps_seen = false;
-                branch.origin = origin_towards(surface, branch.direction);
-                branch.ignored = surface.triangle;
-                continue;
-            }
-            met_surface = true;
-            if (emits(material, facing.front)) {
-                vec3 emission = emitted_radiance(material, -dot(branch.direction, facing.geometric_normal));
-                branch.emitted += branch.emission_seen ? vec3(0.0) : branch.throughput * emission;
-            }
-            branch.emission_seen = false;
-            if (is_mixed(material)) {
-                u = next4(random);
-                choose_part(material, u.x);
-            }
-            if (is_coated(material)) {
-                u = next4(random);
-                branch.throughput *= choose_layer(material, facing, surface, branch.direction, u.x);
-            }
-            // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
-            Reflector reflector = NO_REFLECTOR;
-            reflector.diffuse = material.base_color;
-            if (is_glossy(material)) {
-                reflector = reflector_of(material);
-            }
-            vec3 viewer = -branch.direction;
-            bool stops = is_matte(material) || (is_glossy(material) && reflector.alpha >= FOLLOWED_ALPHA);
-            if (!stops && branch.depth + 1u >= settings.max_depth) {
-                atomicAdd(status.truncated_paths, 1u);
-            } else if (!stops) {
-                ended = false;
-                branch.depth += 1u;
-                branch.ignored = surface.triangle;
-                branch.lamps_seen = false;
-                u = next4(random);
-                if (is_mirror(material)) {
-                    float cosine = dot(viewer, facing.shading_normal);
-                    branch.throughput *= fresnel_schlick(material.base_color, cosine);
-                    if (is_coated(material)) {
-                        branch.throughput *= coat_passes(material.coat, cosine);
-                    }
-                    branch.direction = mirror_direction(facing, branch.direction);
-                } else if (is_glossy(material)) {
-                    if (PUNCTUAL_LIGHTS && reflector.alpha >= SMOOTH_ALPHA) {
-                        branch.emitted += branch.throughput * glint(met, material, facing, reflector, viewer, random);
-                        branch.lamps_seen = true;
-                    }
-                    Branch reflected = branch;
-                    float p = reflection_probability(reflector, dot(viewer, facing.shading_normal));
-                    reflect_branch(reflected, reflector, facing, u.yz);
-                    if (p > 0.0 && p < 1.0 && used + pending_count + 1u < SLOTS) {
-                        reflected.emitted = vec3(0.0);
-                        reflected.origin = origin_towards(surface, reflected.direction);
-                        pending[pending_count] = reflected;
-                        pending_count += 1u;
-                        stops = true;
-                    } else if (u.x < p) {
-                        branch = reflected;
-                        branch.throughput *= 1.0 / p;
-                    } else {
-                        branch.throughput *= 1.0 / (1.0 - p);
-                        stops = true;
-                    }
-                    reflector.alpha = 0.0;
-                    ended = stops || largest(branch.throughput) <= 0.0;
-                } else if (DIELECTRICS) {
-                    if (DISPERSION) {
-                        branch.throughput *= disperse(material, branch.wavelength, random);
-                    }
-                    if (PUNCTUAL_LIGHTS && is_rough_glass(material)) {
-                        branch.emitted +=
-                            branch.throughput * glint(met, material, facing, reflector, viewer, random);
-                        branch.lamps_seen = true;
-                    }
-                    Boundary boundary = meet_boundary(facing, branch.direction, material, met.outside, u.yz);
-                    // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
-                    vec3 transmission = met.tint * (boundary.eta * boundary.eta * boundary.refracted_weight);
-                    bool split = used + pending_count + 1u < SLOTS && boundary.reflectance < 1.0;
-                    bool reflect_now = u.x < boundary.reflectance;
-                    if (split) {
-                        Branch other = branch;
-                        other.direction = boundary.reflected;
-                        other.throughput *= boundary.reflectance * boundary.reflected_weight;
-                        other.media = met.through;
-                        other.emitted = vec3(0.0);
-                        other.origin = origin_towards(surface, other.direction);
-                        pending[pending_count] = other;
-                        pending_count += 1u;
-                        branch.throughput *= 1.0 - boundary.reflectance;
-                        reflect_now = false;
-                    } else if (!branch.reflection_seen && boundary.reflectance < 1.0) {
-                        // A lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
-                        branch.reflection_seen = true;
-                        vec3 from = origin_towards(surface, boundary.reflected);
-                        Glimpse reflection = glimpse(from, boundary.reflected, surface.triangle, met.through,
-                                                     branch.lamps_seen, random);
-                        branch.emitted += branch.throughput * boundary.reflectance * boundary.reflected_weight *
-                                          reflection.emission;
-                        if (reflection.dark) {
-                            // That was all there is to the reflection.
-                            branch.throughput *= 1.0 - boundary.reflectance;
-                            reflect_now = false;
-                        }
-                        branch.emission_seen = reflect_now;
-                    }
-                    branch.direction = reflect_now ? boundary.reflected : boundary.refracted;
-                    branch.throughput *= reflect_now ? boundary.reflected_weight : transmission;
+                if (NESTED && met.hidden) {
+                    branch.throughput *= met.tint;
                     branch.media = met.beyond;
-                    if (reflect_now) {
-                        branch.media = met.through;
+                    branch.origin = origin_towards(met.surface, branch.direction);
+                    continue;
+                }
+                met_surface = true;
+                Material material = met.material;
+                if (is_mixed(material)) {
+                    u = next4(random);
+                    choose_part(material, u.x);
+                }
+                if (is_coated(material)) {
+                    u = next4(random);
+                    branch.throughput *= choose_layer(material, met.facing, met.surface, branch.direction, u.x);
+                }
+                // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
+                Reflector reflector = NO_REFLECTOR;
+                reflector.diffuse = material.base_color;
+                if (is_glossy(material)) {
+                    reflector = reflector_of(material);
+                }
+                vec3 viewer = -branch.direction;
+                bool stops = is_matte(material) || (is_glossy(material) && reflector.alpha >= FOLLOWED_ALPHA);
+                ended = true;
+                if (!stops && branch.depth + 1u >= settings.max_depth) {
+                    atomicAdd(status.truncated_paths, 1u);
+                } else if (!stops) {
+                    branch.depth += 1u;
+                    u = next4(random);
+                    bool rough = is_dielectric(material) ? is_rough_glass(material) : reflector.alpha >= SMOOTH_ALPHA;
+                    if (PUNCTUAL_LIGHTS && rough) {
+                        branch.lamps_seen = true;
+                        if (many) {
+                            branch.emitted += branch.throughput * glint_of_all(met, material, reflector, viewer, random);
+                        } else {
+                            light_ray = glint_of_one(met, material, reflector, viewer, random);
+                            light_ray.contribution *= branch.throughput;
+                        }
                     }
-                    ended = largest(branch.throughput) <= 0.0;
+                    if (is_mirror(material)) {
+                        float cosine = dot(viewer, met.facing.shading_normal);
+                        branch.throughput *= fresnel_schlick(material.base_color, cosine);
+                        if (is_coated(material)) {
+                            branch.throughput *= coat_passes(material.coat, cosine);
+                        }
+                        branch.direction = mirror_direction(met.facing, branch.direction);
+                    } else if (is_glossy(material)) {
+                        Branch reflected = branch;
+                        float p = reflection_probability(reflector, dot(viewer, met.facing.shading_normal));
+                        reflect_branch(reflected, reflector, met.facing, u.yz);
+                        if (many && p > 0.0 && p < 1.0 && used + pending_count + 1u < SLOTS) {
+                            reflected.emitted = vec3(0.0);
+                            reflected.origin = origin_towards(met.surface, reflected.direction);
+                            pending[pending_count] = reflected;
+                            pending_count += 1u;
+                            stops = true;
+                        } else if (u.x < p) {
+                            branch = reflected;
+                            branch.throughput *= 1.0 / p;
+                        } else {
+                            branch.throughput *= 1.0 / (1.0 - p);
+                            stops = true;
+                        }
+                        reflector.alpha = 0.0;
+                    } else if (DIELECTRICS) {
+                        if (DISPERSION) {
+                            branch.throughput *= disperse(material, branch.wavelength, random);
+                        }
+                        Boundary boundary = meet_boundary(met.facing, branch.direction, material, met.outside, u.yz);
+                        // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
+                        vec3 transmission = met.tint * (boundary.eta * boundary.eta * boundary.refracted_weight);
+                        bool splits = many && used + pending_count + 1u < SLOTS && boundary.reflectance < 1.0;
+                        bool uncertain = boundary.reflectance > 0.0 && boundary.reflectance < 1.0;
+                        bool peeks = !splits && !branch.reflection_seen && uncertain;
+                        bool reflects = !splits && (peeks || u.x < boundary.reflectance);
+                        if (many && splits) {
+                            Branch reflected = branch;
+                            reflected.direction = boundary.reflected;
+                            reflected.throughput *= boundary.reflectance * boundary.reflected_weight;
+                            reflected.media = met.through;
+                            reflected.origin = origin_towards(met.surface, reflected.direction);
+                            reflected.emitted = vec3(0.0);
+                            pending[pending_count] = reflected;
+                            pending_count += 1u;
+                            transmission *= 1.0 - boundary.reflectance;
+                        }
+                        if (peeks) {
+                            waits = u.x < boundary.reflectance ? boundary.reflectance : -boundary.reflectance;
+                            let_wait(origin_towards(met.surface, boundary.refracted), boundary.refracted,
+                                     branch.throughput * transmission, met.beyond);
+                            branch.reflection_seen = true;
+                            branch.throughput *= boundary.reflectance;
+                        }
+                        branch.throughput *= reflects ? boundary.reflected_weight : transmission;
+                        branch.direction = reflects ? boundary.reflected : boundary.refracted;
+                        branch.media = met.beyond;
+                        if (reflects) {
+                            branch.media = met.through;
+                        }
+                    }
+                    ended = stops || (largest(branch.throughput) <= 0.0 && waits == 0.0);
+                    branch.origin = origin_towards(met.surface, branch.direction);
                 }
-                branch.origin = origin_towards(surface, branch.direction);
-            }
-            if (stops && (largest(reflector.diffuse) > 0.0 || reflector.alpha > 0.0)) {
-                vec3 weight = branch.throughput;
-                if (GLOSSY) {
-                    gloss = gloss_of(reflector, viewer, has_coat(surface.material));
-                } else {
-                    weight *= reflector.diffuse / PI;
+                if (stops && (largest(reflector.diffuse) > 0.0 || reflector.alpha > 0.0)) {
+                    vec3 weight = branch.throughput;
+                    if (GLOSSY) {
+                        gloss_of_slots[slot] = gloss_of(reflector, viewer, has_coat(met.surface.material));
+                    } else {
+                        weight *= reflector.diffuse / PI;
+                    }
+                    found = true;
+                    visible_points[slot].position_object = vec4(met.surface.position, uintBitsToFloat(met.surface.object));
+                    visible_points[slot].weight_normal =
+                        vec4(weight, uintBitsToFloat(encode_direction(met.facing.geometric_normal)));
+                    visible_points[slot].emitted_normal.w = uintBitsToFloat(encode_direction(met.facing.shading_normal));
                 }
-                visible_point.position_object = vec4(surface.position, uintBitsToFloat(surface.object));
-                visible_point.weight_normal =
-                    vec4(weight, uintBitsToFloat(encode_direction(facing.geometric_normal)));
-                visible_point.emitted_normal.w = uintBitsToFloat(encode_direction(facing.shading_normal));
             }
-        } else if (!branch.emission_seen) {
-            branch.emitted += branch.throughput * radiance_from_afar(branch.direction);
         }
-        if (ended) {
-            visible_point.emitted_normal.rgb = branch.emitted;
-            if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
-                visible_point.weight_normal.w = uintBitsToFloat(met_surface ? 1u : 0u);
+        if (ended && !asks_light(light_ray)) {
+            if (found) {
+                visible_points[slot].emitted_normal.rgb = branch.emitted;
+            } else {
+                visible_points[slot] = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)),
+                                                    vec4(0.0, 0.0, 0.0, uintBitsToFloat(met_surface ? 1u : 0u)),
+                                                    vec4(branch.emitted, 0.0));
             }
-            visible_points[pixel_slot * SLOTS + used] = visible_point;
-            footprints[pixel_slot * SLOTS + used] = settings.pixel_spread * (parallel ? 1.0 : branch.way);
-            if (GLOSSY) {
-                gloss_of_slots[pixel_slot * SLOTS + used] = gloss;
-            }
+            footprints[slot] = settings.pixel_spread * (parallel ? 1.0 : branch.way);
             used += 1u;
             alive = pending_count > 0u && !cut;
             if (alive) {
                 pending_count -= 1u;
                 branch = pending[pending_count];
-                progress = AT_ORIGIN;
+                ended = false;
+                found = false;
             }
         }
     }
     if (cut || loops_cut) {
         atomicAdd(status.cut_paths, 1u);
     }
-    visible_point = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
     for (; used < SLOTS; used++) {
-        visible_points[pixel_slot * SLOTS + used] = visible_point;
+        visible_points[pixel_slot * SLOTS + used] =
+            VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
     }
 }
