@@ -66,58 +66,83 @@ bool asks_behind_glass(uint slot) {
     return asks;
 }
 
-// A ray that asks a light whether it is seen.
-struct Question {
+// A ray towards a light, and what that sends along it if nothing is between.
+struct LightSample {
     vec3 ray;
-    float end;       // of the ray, in its lengths
+    float end;  // of the ray, in its lengths
     PlacedTriangle ignored;
-    uint kind;       // of the light
-    Surface emitter; // triangle: the light's point
-    Sky sky;         // environment
-    vec3 irradiance; // punctual: across the ray
-    float probability; // of the light
-    uint light;
+    vec3 towards;  // unit vector to the light's point
+    vec3 radiance; // of a light that is a point or a direction: irradiance across the ray
+    float density; // per solid angle
+    bool delta;    // no direction of the BSDF meets it
 };
 
-// Towards a light that u.x chooses, or of that source.
-Question ask_light(vec3 position, vec3 normal, vec3 origin, uint of_source, vec3 u, vec2 digits) {
+// What a triangle's light sends to a place from a point, without its opacity, and the density of that point.
+vec3 radiance_of(Surface emitter, uint light, float probability, vec3 position, out vec3 towards, out float density) {
+    vec3 to_light = emitter.position - position;
+    float distance2 = dot(to_light, to_light);
+    towards = to_light * inversesqrt(max(distance2, 1e-37));
+    float cos_light = -dot(towards, emitter.geometric_normal);
+    Material material = emitter_of(emitter);
+    bool shines = emits(material, cos_light > 0.0) && cos_light != 0.0 && probability > 0.0;
+    density = shines ? probability * distance2 / (light_at(light).area * abs(cos_light)) : 1.0;
+    vec3 radiance = shines ? emitted_radiance(material, abs(cos_light)) : vec3(0.0);
+    if (IMMERSED) {
+        // What is between them is what the light is in.
+        radiance *= transmittance(media_of_light(light).first, sqrt(distance2));
+    }
+    return radiance;
+}
+
+// Of a light that u.x chooses, or one of that source.
+LightSample sample_light(vec3 position, vec3 normal, vec3 origin, uint of_source, vec3 u, vec2 digits) {
     uint chosen;
-    Question question;
+    float probability;
     if (FEW_SOURCES) {
         LightSource source = light_source_at(of_source);
         LightWithin within = light_within(source.first_light, source.light_count, digits.x);
         chosen = within.light;
-        question.probability = within.probability;
+        probability = within.probability;
     } else if (MANY_SOURCES) {
         LightChoice choice = choose_light_for(position, normal, u.x, digits.x);
         chosen = choice.light;
-        question.probability = choice.probability;
+        probability = choice.probability;
     } else {
         chosen = choose_light(u.x, digits).index;
-        question.probability = light_at(chosen).probability;
+        probability = light_at(chosen).probability;
     }
     Light light = light_at(chosen);
-    question.kind = light.kind;
-    question.light = chosen;
-    question.end = 1e30;
-    question.ignored = NO_TRIANGLE;
+    LightSample sampled;
+    sampled.end = 1e30;
+    sampled.ignored = NO_TRIANGLE;
+    sampled.delta = false;
     if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
         Arriving arriving = arriving_from(punctual_light_at(chosen), light.kind, origin, u.yz);
-        question.ray = arriving.ray;
-        question.end = arriving.end;
-        question.irradiance = arriving.irradiance;
+        sampled.ray = arriving.ray;
+        sampled.end = arriving.end;
+        sampled.towards = normalize(arriving.ray);
+        sampled.radiance = arriving.irradiance / probability;
+        if (IMMERSED) {
+            sampled.radiance *= transmittance(media_of_light(chosen).first, length(arriving.ray));
+        }
+        sampled.density = 1.0;
+        sampled.delta = true;
     } else if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
-        question.sky = sample_environment(u.yz, question.ray);
+        Sky sky = sample_environment(u.yz, sampled.ray);
+        sampled.towards = normalize(sampled.ray);
+        sampled.radiance = sky.radiance;
+        sampled.density = sky.density * probability;
     } else {
         PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
         Surface emitter = surface_at(triangle, point_of_light(chosen, u.yz));
         // Both ends move off their surfaces.
-        question.ray = origin_towards(emitter, position - emitter.position) - origin;
-        question.end = 1.0 - ENDS_BEFORE;
-        question.ignored = triangle;
-        question.emitter = emitter;
+        sampled.ray = origin_towards(emitter, position - emitter.position) - origin;
+        sampled.end = 1.0 - ENDS_BEFORE;
+        sampled.ignored = triangle;
+        sampled.radiance = share_there(emitter) *
+                           radiance_of(emitter, chosen, probability, position, sampled.towards, sampled.density);
     }
-    return question;
+    return sampled;
 }
 
 // Whether a light is so near that the squared distance to its points varies much.
@@ -142,9 +167,33 @@ float probability_of_light(vec3 position, vec3 normal, uint of_source, uint ligh
     return light_at(light).probability;
 }
 
+// What comes along a ray that a direction of the BSDF has chosen, and the density of that direction by lights.
+vec3 radiance_along(vec3 ray, Hit hit, vec3 position, vec3 normal, uint of_source, Random random, out float density) {
+    vec3 radiance = vec3(0.0);
+    density = 0.0;
+    if (hit.triangle == MISS) {
+        if (ENVIRONMENT) {
+            Sky sky = environment_at(ray);
+            float probability = probability_of_light(position, normal, of_source, settings.light_count - 1u);
+            radiance = FEW_SOURCES && probability <= 0.0 ? vec3(0.0) : sky.radiance;
+            density = sky.density * probability;
+        }
+    } else {
+        Surface emitter = interface_at(hit, ray, IN_VACUUM, false, random).surface;
+        if (emitter.light != NO_LIGHT) {
+            // A ray that met the light had its chance to pass it.
+            uint light = light_at_place(emitter);
+            vec3 towards;
+            radiance = radiance_of(emitter, light, probability_of_light(position, normal, of_source, light), position, towards,
+                                   density);
+        }
+    }
+    return radiance;
+}
+
 // One ray, by chance towards a point of a light or along a direction of the BSDF, with the density of both together
 // (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
-// variance next to a light. No direction of the BSDF meets a punctual light.
+// variance next to a light. What a light would bring is known before its ray is traced, so that little else is at hand then.
 // behind_glass: glass stands before the light, so that this is what it would bring unbent.
 vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool asks, inout Random random,
                    out bool behind_glass) {
@@ -157,10 +206,13 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     vec3 geometric_normal = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
     vec3 shading_normal = decode_direction(floatBitsToUint(visible_point.emitted_normal.w));
     vec3 origin = offset_origin(position, geometric_normal, reach_of(floatBitsToUint(visible_point.position_object.w)));
-    Question question;
-    question.ray = cosine_direction(shading_normal, u.yz);
-    question.end = 1e30;
-    question.ignored = NO_TRIANGLE;
+    LightSample sampled;
+    sampled.ray = cosine_direction(shading_normal, u.yz);
+    sampled.end = 1e30;
+    sampled.ignored = NO_TRIANGLE;
+    sampled.radiance = vec3(1.0);
+    sampled.density = 0.0;
+    sampled.delta = false;
     // A reflection may be too narrow for points of lights to find it.
     Reflector reflector = NO_REFLECTOR;
     vec3 viewer = vec3(0.0);
@@ -174,7 +226,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
             bsdf_sampling = 0.5;
             reflections = reflection_probability(reflector, dot(shading_normal, viewer));
             if (u.x < reflections) {
-                question.ray = reflected_direction(reflector.alpha, shading_normal, viewer, u.yz);
+                sampled.ray = reflected_direction(reflector.alpha, shading_normal, viewer, u.yz);
             }
         }
     }
@@ -182,22 +234,36 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
         bsdf_sampling = is_punctual(light_source_at(of_source).kind) ? 0.0 : bsdf_sampling;
     }
     bool by_bsdf = u.w < bsdf_sampling;
+    sampled.towards = sampled.ray;
     if (!by_bsdf) {
-        question = ask_light(position, shading_normal, origin, of_source, u.xyz, digits.xz);
+        sampled = sample_light(position, shading_normal, origin, of_source, u.xyz, digits.xz);
     }
-    vec3 ray = question.ray;
-    if (dot(ray, geometric_normal) <= 0.0 || dot(ray, shading_normal) <= 0.0) {
-        return vec3(0.0);
+    vec3 ray = sampled.ray;
+    float cos_surface = dot(sampled.towards, shading_normal);
+    bool leaves = dot(ray, geometric_normal) > 0.0 && dot(ray, shading_normal) > 0.0 && cos_surface > 0.0;
+    float of_bsdf = cos_surface / PI;
+    vec3 weight = visible_point.weight_normal.rgb * cos_surface;
+    if (GLOSSY) {
+        weight *= brdf(reflector, shading_normal, viewer, sampled.towards);
+        if (reflector.alpha > 0.0) {
+            float of_lobe = reflected_density(reflector.alpha, shading_normal, viewer, sampled.towards);
+            of_bsdf = mix(of_bsdf, of_lobe, reflections);
+        }
     }
-    Hit hit;
+    of_bsdf *= bsdf_sampling;
+    float by_light = 1.0 - bsdf_sampling;
+    vec3 brings = leaves ? weight * sampled.radiance : vec3(0.0);
+    if (!by_bsdf) {
+        brings /= by_light * sampled.density + (sampled.delta ? 0.0 : of_bsdf);
+    }
+    Hit hit = NO_HIT;
     vec3 from = origin;
     float passed = 0.0;
-    vec3 tint = vec3(1.0);
     uint crossings = 0u;
     bool any = !by_bsdf;
-    bool goes_on = true;
+    bool goes_on = largest(brings) > 0.0;
     while (goes_on) {
-        hit = trace_visible(from, ray, AT_ORIGIN, question.end - passed, question.ignored, any, random);
+        hit = trace_visible(from, ray, AT_ORIGIN, sampled.end - passed, sampled.ignored, any, random);
         goes_on = ASKS_BEHIND_GLASS && asks && hit.triangle != MISS && !loops_cut && crossings < MOST_CROSSINGS;
         if (goes_on) {
             ShadingTriangle triangle = shading_triangle(hit.triangle);
@@ -207,7 +273,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
             if (goes_on && !any) {
                 Surface met = surface_at(hit);
                 behind_glass = true;
-                tint *= glass.base_color;
+                brings *= glass.base_color;
                 from = origin_towards(met, ray);
                 passed = dot(from - origin, ray) / dot(ray, ray);
                 crossings += 1u;
@@ -215,88 +281,17 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
             any = false;
         }
     }
-    if (loops_cut) {
+    bool is_cut = loops_cut;
+    if (by_bsdf && largest(brings) > 0.0 && !is_cut) {
+        float density;
+        vec3 radiance = radiance_along(ray, hit, position, shading_normal, of_source, random, density);
+        brings *= radiance / (by_light * density + of_bsdf);
+    }
+    bool blocked = !by_bsdf && hit.triangle != MISS;
+    if (is_cut) {
         atomicAdd(status.cut_paths, behind_glass ? 0u : 1u);
-        return vec3(0.0);
     }
-    bool missed = hit.triangle == MISS;
-    if (!by_bsdf && !missed) {
-        return vec3(0.0);
-    }
-    bool punctual = PUNCTUAL_LIGHTS && !by_bsdf && is_punctual(question.kind);
-    vec3 direction = normalize(ray);
-    vec3 radiance;
-    float of_light = 0.0; // density per solid angle
-    if (punctual) {
-        radiance = question.irradiance / question.probability;
-        if (IMMERSED) {
-            radiance *= transmittance(media_of_light(question.light).first, length(ray));
-        }
-    } else if (ENVIRONMENT && (by_bsdf ? missed : question.kind == ENVIRONMENT_LIGHT)) {
-        Sky sky = question.sky;
-        if (by_bsdf) {
-            sky = environment_at(ray);
-        }
-        radiance = sky.radiance;
-        float probability = question.probability;
-        if (by_bsdf) {
-            probability = probability_of_light(position, shading_normal, of_source, settings.light_count - 1u);
-        }
-        if (FEW_SOURCES && probability <= 0.0) {
-            return vec3(0.0);
-        }
-        of_light = sky.density * probability;
-    } else {
-        Surface emitter = question.emitter;
-        if (by_bsdf) {
-            if (missed) {
-                return vec3(0.0);
-            }
-            emitter = interface_at(hit, ray, IN_VACUUM, false, random).surface;
-        }
-        if (emitter.light == NO_LIGHT) {
-            return vec3(0.0);
-        }
-        uint index = by_bsdf ? light_at_place(emitter) : question.light;
-        Light light = light_at(index);
-        Material material = material_of(emitter);
-        vec3 to_light = emitter.position - position;
-        float distance2 = dot(to_light, to_light);
-        direction = to_light * inversesqrt(max(distance2, 1e-37));
-        float cos_light = -dot(direction, emitter.geometric_normal);
-        if (!emits(material, cos_light > 0.0) || cos_light == 0.0) {
-            return vec3(0.0);
-        }
-        // A ray that met the light had its chance to pass it.
-        float there = by_bsdf ? 1.0 : share_there(emitter);
-        radiance = there * emitted_radiance(material, abs(cos_light));
-        if (IMMERSED) {
-            // What is between them is what the light is in.
-            radiance *= transmittance(media_of_light(index).first, sqrt(distance2));
-        }
-        float probability = question.probability;
-        if (by_bsdf) {
-            probability = probability_of_light(position, shading_normal, of_source, index);
-        }
-        if (FEW_SOURCES && probability <= 0.0) {
-            return vec3(0.0);
-        }
-        of_light = probability * distance2 / (light.area * abs(cos_light));
-    }
-    float cos_surface = dot(direction, shading_normal);
-    if (cos_surface <= 0.0) {
-        return vec3(0.0);
-    }
-    float of_bsdf = cos_surface / PI;
-    vec3 weight = visible_point.weight_normal.rgb;
-    if (GLOSSY) {
-        weight *= brdf(reflector, shading_normal, viewer, direction);
-        if (reflector.alpha > 0.0) {
-            of_bsdf = mix(of_bsdf, reflected_density(reflector.alpha, shading_normal, viewer, direction), reflections);
-        }
-    }
-    float density = punctual ? 1.0 - bsdf_sampling : mix(of_light, of_bsdf, bsdf_sampling);
-    return weight * radiance * (cos_surface / density) * tint;
+    return is_cut || blocked ? vec3(0.0) : brings;
 }
 
 // Adds what it brings, or what that would be unbent.
