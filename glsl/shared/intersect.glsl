@@ -259,8 +259,7 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
     }
     Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
     LocalRay local = in_render_space(ray);
-    mat3x4 rows = UNPLACED; // of the instance that the lane is in
-    uint instance = NO_INSTANCE;
+    uint instance = NO_INSTANCE; // that the lane is in
     uint outside = STACK_SIZE; // the depth of the stack at which it leaves that
     uint stack[STACK_SIZE];
     uint depth = 0u;
@@ -286,9 +285,13 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
             vec3 corner2 = row2.xyz;
             bool tests = index != ignored.triangle;
             if (INSTANCED) {
-                corner0 = placed(rows, corner0);
-                corner1 = placed(rows, corner1);
-                corner2 = placed(rows, corner2);
+                if (instance != NO_INSTANCE) {
+                    // Loaded anew for each triangle: kept at hand they would be twelve registers.
+                    mat3x4 rows = instance_at(instance).rows;
+                    corner0 = placed(rows, corner0);
+                    corner1 = placed(rows, corner1);
+                    corner2 = placed(rows, corner2);
+                }
                 tests = floatBitsToUint(row3.z) == 0u && (tests || instance != ignored.instance);
             }
             PlacedTriangle at = PlacedTriangle(index, instance);
@@ -300,7 +303,6 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
             if (INSTANCED) {
                 uint kind = floatBitsToUint(row3.z);
                 if (kind == PLACEMENT_RECORD) {
-                    rows = mat3x4(row0, row1, row2);
                     instance = index;
                 } else if (kind == RAY_RECORD) {
                     local = in_instance(ray, mat3x4(row0, row1, row2), row3.w);
@@ -328,7 +330,6 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
             if (INSTANCED) {
                 if (depth == outside) {
                     local = in_render_space(ray);
-                    rows = UNPLACED;
                     instance = NO_INSTANCE;
                     outside = STACK_SIZE;
                 }
