@@ -49,6 +49,7 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
             specular,
             storage_buffer_bytes,
             loop_limit: u32::MAX,
+            clustered_run: 8,
             lanes: 4096,
             splitting: true,
             glossy: true,

@@ -97,6 +97,7 @@ fn pictures_of_usual_sizes_fit_what_a_small_device_binds() {
     let limits = Limits {
         storage_buffer_bytes: BINDABLE,
         loop_limit: u32::MAX,
+        clustered_run: 8,
         lanes: 4096,
         splitting: true,
         specular: true,

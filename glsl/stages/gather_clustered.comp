@@ -18,7 +18,9 @@ layout(local_size_x = 64) in;
 #include "grid.glsl"
 #include "status.glsl"
 
-const uint RUN = 8u; // visible points: 4×2 pixels, see pixel_of
+// Visible points: 4×2 pixels, see pixel_of. Processors load a photon once for all; on GPUs, whose caches do that, more than one
+// takes the registers that hide memory's latency.
+layout(constant_id = 1) const uint RUN = 8u;
 
 // The part of the sorted photons that this launch looks at.
 layout(push_constant) uniform Push {

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::median;
 use super::structure::{Structure, structure};
 use crate::backend::{Backend, DeviceDescription};
-use crate::config::{GROUP, Probe, RenderConfig, Totals};
+use crate::config::{GROUP, Probe, RenderConfig, Sizes, Totals};
 use crate::cpu::{self, Counts, Inputs};
 use crate::emission::Aim;
 use crate::error::{Error, Result};
@@ -207,7 +207,7 @@ impl GatherBench<'_> {
             steps,
             methods: methods
                 .into_iter()
-                .map(|method| method.result(visible_points))
+                .map(|method| method.result(visible_points, renderer.sizes()))
                 .collect(),
         })
     }
@@ -433,11 +433,11 @@ impl Measured {
         Ok(())
     }
 
-    fn result(self, visible_points: usize) -> MethodResult {
+    fn result(self, visible_points: usize, sizes: &Sizes) -> MethodResult {
         let phase = |index: usize| median(self.times.iter().map(|times| times[index]).collect());
         let gather_us = phase(2) / self.share;
         let sharing = match METHODS[self.method].runs {
-            Runs::Device { sharing, .. } => f64::from(sharing),
+            Runs::Device { sharing, .. } => sharing(sizes).into(),
             _ => 1.0,
         };
         let tests = self.tested * visible_points as f64;

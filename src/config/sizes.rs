@@ -25,8 +25,8 @@ pub const NO_SLOT: u32 = u32::MAX;
 pub const CURVE_BITS: u32 = 18;
 /// Rounds of Lloyd's algorithm for the k-means clusters.
 pub const LLOYD_ROUNDS: u32 = 4;
-/// Visible points that an invocation of `gather_clustered.comp` has.
-pub const CLUSTERED_RUN: u32 = 8;
+/// Visible points that an invocation of `gather_clustered.comp` has on a processor, a divisor of a tile's.
+pub const RUN_ON_CPU: u32 = 8;
 /// log2 of the entries of the table of what visible points want.
 pub const DEMAND_BITS: u32 = 18;
 /// Radii that the mean of a grid's radii is taken of, about: their sum has to fit a u32.
@@ -63,6 +63,8 @@ pub struct Sizes {
     pub cell_bits: u32,
     /// Launches among which a gather's photons are dealt: 1 unless the driver cuts its loops.
     pub gather_parts: u32,
+    /// Visible points that an invocation of `gather_clustered.comp` has.
+    pub clustered_run: u32,
     /// The scene's objects.
     pub meshes: u32,
     /// Cells of all objects' grids.
@@ -106,6 +108,8 @@ pub struct Limits {
     pub loop_limit: u32,
     /// Invocations that keep the device busy.
     pub lanes: u32,
+    /// Visible points that an invocation of `gather_clustered.comp` has.
+    pub clustered_run: u32,
     /// Whether the scene has surfaces at which a path splits in two.
     pub splitting: bool,
     /// Whether it has mirrors or glass.
@@ -151,6 +155,7 @@ impl Sizes {
             lane_capacity: 0,
             photon_capacity: 0,
             gather_parts: 1,
+            clustered_run: limits.clustered_run,
             cell_bits: (batch_paths.ilog2() + 3).clamp(12, 24),
             meshes: limits.meshes,
             object_cells: limits.object_cells,
@@ -233,12 +238,12 @@ impl Sizes {
             BufferId::GlossOf => (if self.glossy { slots } else { 1 }, size_of::<Gloss>()),
             BufferId::EmissionTable if self.aimed => (1, EMISSION_TABLE_BYTES),
             BufferId::EmissionTable => (1, 16),
+            BufferId::PathStarts => (u64::from(self.batch_paths), size_of::<PathStart>()),
             BufferId::PathValues => (if self.aimed { u64::from(self.batch_paths) } else { 1 }, 4),
             BufferId::StatisticsOf => (receivers, size_of::<Statistics>()),
             BufferId::GatheredOf => (receivers, size_of::<Gathered>()),
             BufferId::DirectSums => (slots, size_of::<DirectSum>()),
             id if SEQUENCE_SUMS.contains(&id) => (slots, 16),
-            BufferId::PathStarts => (u64::from(self.batch_paths), size_of::<PathStart>()),
             BufferId::CoverageOf => (receivers, size_of::<Coverage>()),
             BufferId::TestsOf => (if self.probe.count_tests { receivers } else { 1 }, 4),
             BufferId::Footprints => (slots, 4),
@@ -336,6 +341,7 @@ mod tests {
                 storage_buffer_bytes,
                 loop_limit: u32::MAX,
                 lanes,
+                clustered_run: 1,
                 splitting: false,
                 specular: false,
                 glossy: false,

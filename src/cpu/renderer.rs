@@ -67,6 +67,7 @@ impl Renderer {
             storage_buffer_bytes: PHOTON_BYTES,
             loop_limit: u32::MAX,
             lanes: LANES,
+            clustered_run: 1,
             splitting: scene.features.dielectric || scene.features.glossy,
             specular: scene.features.mirror || scene.features.dielectric,
             glossy: scene.features.glossy,

@@ -7,7 +7,7 @@ mod primitives;
 pub use photons::grid_sizes;
 pub use primitives::{PHOTON_PAIRS, POINT_PAIRS, Pairs, scan, sort};
 
-use crate::config::{CLUSTERED_RUN, GROUP, Sizes};
+use crate::config::{GROUP, Sizes};
 use crate::record::Recording;
 
 /// Records stages for buffers of these sizes.
@@ -37,7 +37,7 @@ pub enum Runs {
         /// How many photons a visible point tests.
         tests: Tests,
         /// Visible points that a photon is loaded for at once.
-        sharing: u32,
+        sharing: fn(&Sizes) -> u32,
     },
     /// A kd-tree on the CPU.
     CpuKdTree,
@@ -69,7 +69,15 @@ impl GatherMethod {
     }
 }
 
-const fn device(order: Record, gather: Record, tests: Tests, sharing: u32) -> Runs {
+fn alone(_: &Sizes) -> u32 {
+    1
+}
+
+fn by_group(_: &Sizes) -> u32 {
+    GROUP
+}
+
+const fn device(order: Record, gather: Record, tests: Tests, sharing: fn(&Sizes) -> u32) -> Runs {
     Runs::Device {
         order,
         gather,
@@ -84,61 +92,68 @@ pub const METHODS: &[GatherMethod] = &[
         name: "naive",
         summary: "every visible point tests every photon",
         paper: "tables 1 to 3, «Naive solution»",
-        runs: device(points::by_slot, photons::naive, Tests::All, 1),
+        runs: device(points::by_slot, photons::naive, Tests::All, alone),
     },
     GatherMethod {
         name: "naive-distance",
         summary: "the same by the built-in distance() instead of a squared distance",
         paper: "section 8, distance() against manual calculation",
-        runs: device(points::by_slot, photons::naive_distance, Tests::All, 1),
+        runs: device(points::by_slot, photons::naive_distance, Tests::All, alone),
     },
     GatherMethod {
         name: "local",
         summary: "blocks of photons staged through shared memory",
         paper: "table 3, «Local memory»",
-        runs: device(points::by_slot, photons::local, Tests::All, GROUP),
+        runs: device(points::by_slot, photons::local, Tests::All, by_group),
     },
     GatherMethod {
         name: "photon-sort",
         summary: "photons sorted by mesh with atomic counters; a visible point tests its mesh's",
         paper: "table 3, «Photon sorting»",
-        runs: device(points::by_slot, photons::mesh, Tests::All, 1),
+        runs: device(points::by_slot, photons::mesh, Tests::All, alone),
     },
     GatherMethod {
         name: "hitpoint-sort",
         summary: "visible points sorted by mesh too, with fillers so that no workgroup spans two",
         paper: "table 3, «Hitpoint sorting»",
-        runs: device(points::by_mesh, photons::ordered_mesh, Tests::All, 1),
+        runs: device(points::by_mesh, photons::ordered_mesh, Tests::All, alone),
     },
     GatherMethod {
         name: "hitpoint-sort-local-distance",
         summary: "the same through shared memory, by the built-in distance()",
         paper: "table 3, «Hitpoint sorting, local memory»",
-        runs: device(points::by_mesh, photons::ordered_mesh_local_distance, Tests::All, GROUP),
+        runs: device(
+            points::by_mesh,
+            photons::ordered_mesh_local_distance,
+            Tests::All,
+            by_group,
+        ),
     },
     GatherMethod {
         name: "hitpoint-sort-local",
         summary: "the same through shared memory, by a squared distance",
         paper: "section 8, 125 ms and 1 941 ms",
-        runs: device(points::by_mesh, photons::ordered_mesh_local, Tests::All, GROUP),
+        runs: device(points::by_mesh, photons::ordered_mesh_local, Tests::All, by_group),
     },
     GatherMethod {
         name: "cluster",
         summary: "visible points in k-means clusters within their mesh, with fillers; shared memory",
         paper: "table 4, «Hitpoint sorting, local memory» (33 % fillers)",
-        runs: device(points::by_cluster, photons::ordered_mesh_local, Tests::All, GROUP),
+        runs: device(points::by_cluster, photons::ordered_mesh_local, Tests::All, by_group),
     },
     GatherMethod {
         name: "cluster-grid",
         summary: "the clusters, and a grid for each object whose cells are sorted with atomic counters",
         paper: "table 4, «Grid structure»",
-        runs: device(points::by_cluster, photons::object_grids, Tests::Near, 1),
+        runs: device(points::by_cluster, photons::object_grids, Tests::Near, alone),
     },
     GatherMethod {
         name: "clustered",
         summary: "runs of neighbouring visible points share what they load from rows of a hashed grid",
         paper: "beyond the paper",
-        runs: device(points::by_slot, photons::hashed_grid, Tests::Near, CLUSTERED_RUN),
+        runs: device(points::by_slot, photons::hashed_grid, Tests::Near, |sizes| {
+            sizes.clustered_run
+        }),
     },
     GatherMethod {
         name: "cpu-kdtree",

@@ -1,7 +1,7 @@
 //! Orders of photons, and gathering from them: what is recorded for each batch of photons.
 
 use super::primitives::{PHOTON_PAIRS, scan, sort};
-use crate::config::{CLUSTERED_RUN, EXHAUSTIVE_RANGE, GROUP, Sizes};
+use crate::config::{EXHAUSTIVE_RANGE, GROUP, Sizes};
 use crate::record::Recording;
 use crate::shaders;
 use crate::stage::{BufferId, Shader, StageDesc};
@@ -183,9 +183,11 @@ pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
     let [sorted, _] = sort(BufferId::PhotonCount, photons, sizes.cell_bits, PHOTON_PAIRS, recording);
     let values = vec![(BufferId::ValuesIn, sorted.values)];
     recording.dispatch(StageDesc::new(&shaders::GRID_PHOTONS, photons).bind(values));
-    let runs = sizes.receivers().div_ceil(CLUSTERED_RUN);
+    let runs = sizes.receivers().div_ceil(sizes.clustered_run);
     for [first, end] in parts(sizes) {
-        recording.dispatch(gather_stage(&shaders::GATHER_CLUSTERED, runs, sizes).push([first, end]));
+        let mut gather = gather_stage(&shaders::GATHER_CLUSTERED, runs, sizes);
+        gather.constants.to_mut().push(("RUN", sizes.clustered_run));
+        recording.dispatch(gather.push([first, end]));
     }
 }
 
