@@ -14,6 +14,20 @@ use crate::text::escaped;
 #[derive(Debug, Default)]
 pub struct Profile {
     runs: Vec<Run>,
+    /// When each began, since the render did.
+    begins: Vec<Duration>,
+}
+
+/// What is between the iterations, in microseconds: of the wall clock from one iteration's start to the next one's, what the
+/// device didn't work in.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Gaps {
+    /// The median one.
+    pub median_us: f64,
+    /// All together: pictures that were made in between count.
+    pub total_us: f64,
+    /// Wall clock from the first iteration's start to the last one's.
+    pub wall_us: f64,
 }
 
 /// What the launches of one stage took, in microseconds.
@@ -55,14 +69,29 @@ pub struct Subject {
 }
 
 impl Profile {
-    /// Adds an iteration.
-    pub fn add(&mut self, run: Run) {
+    /// Adds an iteration that began so long after the render.
+    pub fn add(&mut self, began: Duration, run: Run) {
+        self.begins.push(began);
         self.runs.push(run);
     }
 
     /// Wall-clock time from each submission to its end, summed.
     pub fn wall(&self) -> Duration {
         self.runs.iter().map(|run| run.wall).sum()
+    }
+
+    /// The host's gaps between iterations; `None` where there is only one.
+    pub fn gaps(&self) -> Option<Gaps> {
+        let walls = self.begins.windows(2).map(|pair| us(pair[1].saturating_sub(pair[0])));
+        // One that was begun while the one before still ran may have less wall clock of its own than work.
+        let mut gaps: Vec<f64> = walls.zip(&self.runs).map(|(wall, run)| wall - busy_us(run)).collect();
+        gaps.sort_by(f64::total_cmp);
+        let (first, last) = (self.begins.first()?, self.begins.last()?);
+        (!gaps.is_empty()).then(|| Gaps {
+            median_us: quantile(&gaps, 0.5),
+            total_us: gaps.iter().sum(),
+            wall_us: us(last.saturating_sub(*first)),
+        })
     }
 
     /// The stages in the order of their first launch.
@@ -98,7 +127,7 @@ impl Profile {
     pub fn table(&self, subject: &Subject) -> String {
         let stages = self.stages();
         let stages_us: f64 = stages.iter().map(|stage| stage.total_us).sum();
-        let wall_us = self.wall().as_secs_f64() * 1e6;
+        let wall_us = us(self.wall());
         let [width, height] = subject.resolution;
         let mut text = format!(
             "{} at {width}x{height}, {} photon paths an iteration, gather {}\non {} ({}), timestamps of {} ns\n\n",
@@ -146,6 +175,14 @@ impl Profile {
             subject.photons_emitted,
             subject.counters.photons()
         );
+        if let Some(gaps) = self.gaps() {
+            let _ = writeln!(
+                text,
+                "between iterations the device had no work for {:.1} µs (median), {:.1} µs in all, of {:.1} µs from the first \
+                 iteration's start to the last one's",
+                gaps.median_us, gaps.total_us, gaps.wall_us
+            );
+        }
         text
     }
 
@@ -156,7 +193,8 @@ impl Profile {
             "subject": subject,
             "iterations": self.runs.len(),
             "stages_us": stages.iter().map(|stage| stage.total_us).sum::<f64>(),
-            "submissions_us": self.wall().as_secs_f64() * 1e6,
+            "submissions_us": us(self.wall()),
+            "gaps": self.gaps(),
             "stages": stages,
         })
     }
@@ -190,6 +228,27 @@ impl Profile {
     }
 }
 
+fn us(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e6
+}
+
+/// Microseconds in which at least one launch ran: some run side by side.
+fn busy_us(run: &Run) -> f64 {
+    let mut spans: Vec<[f64; 2]> = run
+        .launches
+        .iter()
+        .map(|launch| [launch.begin_ns, launch.begin_ns + launch.duration_ns])
+        .collect();
+    spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut end = f64::NEG_INFINITY;
+    let mut busy = 0.0;
+    for [from, to] in spans {
+        busy += (to - from.max(end)).max(0.0);
+        end = end.max(to);
+    }
+    busy * 1e-3
+}
+
 /// The value below which the part `q` of the sorted values lies.
 fn quantile(sorted: &[f64], q: f64) -> f64 {
     let rank = (q * sorted.len() as f64).ceil() as usize;
@@ -208,10 +267,14 @@ mod tests {
                 begin_ns: f64::from(begin),
                 duration_ns: f64::from(us) * 1e3,
             };
-            profile.add(Run {
-                launches: vec![launch("camera", i * 1000, i), launch("photons", i * 1000 + 500, 30)],
+            let run = Run {
+                launches: vec![
+                    launch("camera", i * 1_000_000, i),
+                    launch("photons", i * 1_000_000 + 500_000, 30),
+                ],
                 wall: Duration::from_micros(u64::from(i) + 30),
-            });
+            };
+            profile.add(Duration::from_micros(u64::from(i) * 1000), run);
         }
         profile
     }
@@ -230,6 +293,34 @@ mod tests {
         );
         assert_eq!(camera.total_us, 210.0);
         assert!((camera.share - 210.0 / 810.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_gap_is_what_the_device_did_not_work_from_one_iteration_to_the_next() {
+        let gaps = profile().gaps().expect("gaps");
+        // Iteration i works for i and 30 of 1,000 µs; the last one has no next.
+        let all: Vec<f64> = (1..20).map(|i| 970.0 - f64::from(i)).collect();
+        let close = |found: f64, expected: f64| (found - expected).abs() < 1e-6;
+        assert!(close(gaps.median_us, 960.0), "{gaps:?}");
+        assert!(close(gaps.total_us, all.iter().sum()), "{gaps:?}");
+        assert!(close(gaps.wall_us, 19_000.0), "{gaps:?}");
+        let mut one = Profile::default();
+        one.add(Duration::ZERO, Run::default());
+        assert_eq!(one.gaps(), None);
+    }
+
+    #[test]
+    fn launches_side_by_side_are_no_longer_work_than_the_time_that_they_take_together() {
+        let launch = |begin_ns, duration_ns| Launch {
+            stage: "a",
+            begin_ns,
+            duration_ns,
+        };
+        let run = Run {
+            launches: vec![launch(0.0, 4e3), launch(1e3, 2e3), launch(3e3, 3e3), launch(9e3, 1e3)],
+            wall: Duration::ZERO,
+        };
+        assert!((busy_us(&run) - 7.0).abs() < 1e-9, "{}", busy_us(&run));
     }
 
     #[test]

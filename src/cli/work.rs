@@ -88,6 +88,7 @@ impl Work<'_> {
         while backend.iterations() == 0
             || !((self.asked)() || self.limits.done(backend.iterations(), start.elapsed(), error) >= 1.0)
         {
+            let began = start.elapsed();
             let done = backend.iterate_unless(&stop).and_then(|run| {
                 let iterations = backend.iterations();
                 let is_due = ErrorEstimate::is_due(iterations);
@@ -105,7 +106,7 @@ impl Work<'_> {
             });
             match done {
                 // A day's launches are gigabytes.
-                Ok(Some(run)) if self.profiled => profile.add(run),
+                Ok(Some(run)) if self.profiled => profile.add(began, run),
                 Ok(Some(_)) => {}
                 Ok(None) => break,
                 Err(error) => {
