@@ -6,10 +6,12 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 
 use super::buffer::Buffer;
-use super::context::{Context, DeviceSummary, Instance, OrVulkan};
+use super::context::{Context, DeviceSummary, Instance};
+use super::descriptors::Descriptors;
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
 use super::self_check;
+use super::submission::Slots;
 use crate::error::{Error, Result};
 use crate::stage::BufferId;
 use crate::text;
@@ -39,11 +41,11 @@ pub struct Device {
     pub(super) summary: DeviceSummary,
     pub(super) loop_limit: u32,
     pub(super) buffers: HashMap<BufferId, Buffer>,
-    pub(super) read_back: HashMap<BufferId, Buffer>,
     pub(super) pipelines: Pipelines,
-    pub(super) pool: vk::CommandPool,
-    pub(super) commands: vk::CommandBuffer,
-    pub(super) fence: vk::Fence,
+    pub(super) descriptors: Descriptors,
+    pub(super) slots: Slots,
+    /// Nanoseconds that an invocation of each stage took when it last ran.
+    pub(super) thread_ns: HashMap<&'static str, f64>,
     // Last: everything above is made from it.
     pub(super) context: Context,
 }
@@ -60,39 +62,16 @@ impl Device {
         let (physical, summary) = choose(devices, choice)?;
         check_usable(&summary)?;
         let context = Context::new(instance, physical)?;
-        // SAFETY: plain creation calls; Drop destroys what they make before the context goes.
-        let (pool, commands, fence) = unsafe {
-            let create = vk::CommandPoolCreateInfo::default()
-                .queue_family_index(context.family)
-                .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
-            let pool = context
-                .device
-                .create_command_pool(&create, None)
-                .or_vulkan("vkCreateCommandPool")?;
-            let allocate = vk::CommandBufferAllocateInfo::default()
-                .command_pool(pool)
-                .command_buffer_count(1);
-            let commands = context
-                .device
-                .allocate_command_buffers(&allocate)
-                .or_vulkan("vkAllocateCommandBuffers")?[0];
-            let fence = context
-                .device
-                .create_fence(&vk::FenceCreateInfo::default(), None)
-                .or_vulkan("vkCreateFence")?;
-            (pool, commands, fence)
-        };
-        context.name(commands, "commands");
+        let slots = Slots::new(&context)?;
         let cache = PipelineCache::open(&context, physical)?;
         let mut device = Self {
             summary,
             loop_limit: u32::MAX,
             buffers: HashMap::new(),
-            read_back: HashMap::new(),
             pipelines: Pipelines::new(cache),
-            pool,
-            commands,
-            fence,
+            descriptors: Descriptors::default(),
+            slots,
+            thread_ns: HashMap::new(),
             context,
         };
         device.loop_limit = self_check::loop_limit(&mut device)?;
@@ -138,35 +117,33 @@ impl Device {
     /// Gives back the memory of the buffer `id`.
     pub(super) fn remove(&mut self, id: BufferId) {
         if let Some(buffer) = self.buffers.remove(&id) {
+            if self.slots.are_busy() {
+                // SAFETY: a plain call. What fails here fails where the work is waited for.
+                let _ = unsafe { self.context.device.device_wait_idle() };
+            }
+            self.descriptors.free(&self.context);
             buffer.free(&self.context);
         }
     }
 
-    /// Makes the buffer `id` with this content.
+    /// Makes the buffer `id` with this content, or gives the one of that size another.
     ///
     /// # Errors
     /// As [`Device::create`], and failed Vulkan calls.
     pub fn upload<T: bytemuck::NoUninit>(&mut self, id: BufferId, data: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
-        self.create(id, bytes.len() as u64)?;
+        let size = bytes.len() as u64;
+        if self.size(id) != size.max(4) {
+            self.create(id, size)?;
+        }
         if bytes.is_empty() {
             return Ok(());
         }
-        let mut staging = Buffer::new(&self.context, "staging", bytes.len() as u64, MemoryLocation::CpuToGpu)?;
+        let mut staging = Buffer::new(&self.context, "staging", size, MemoryLocation::CpuToGpu)?;
         staging.mapped()[..bytes.len()].copy_from_slice(bytes);
-        let target = self.buffers[&id].handle;
-        let result = self.submit(|context, commands| {
-            let region = vk::BufferCopy::default().size(bytes.len() as u64);
-            // SAFETY: both buffers hold that many bytes and live until the submission has been waited for.
-            unsafe {
-                context
-                    .device
-                    .cmd_copy_buffer(commands, staging.handle, target, &[region])
-            };
-            Ok(())
-        });
+        let copied = self.copy(staging.handle, self.buffers[&id].handle, size);
         staging.free(&self.context);
-        result.map(|_| ())
+        copied
     }
 
     /// Bytes of all buffers.
@@ -259,11 +236,11 @@ impl Drop for Device {
         // SAFETY: after the wait nothing uses what is destroyed.
         unsafe {
             let _ = self.context.device.device_wait_idle();
-            self.context.device.destroy_fence(self.fence, None);
-            self.context.device.destroy_command_pool(self.pool, None);
         }
+        self.slots.free(&self.context);
+        self.descriptors.free(&self.context);
         self.pipelines.free(&self.context);
-        for (_, buffer) in self.buffers.drain().chain(self.read_back.drain()) {
+        for (_, buffer) in self.buffers.drain() {
             buffer.free(&self.context);
         }
     }

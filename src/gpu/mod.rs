@@ -4,11 +4,14 @@
 
 mod buffer;
 mod context;
+mod descriptors;
 mod device;
 mod execute;
 mod pipeline;
 mod pipeline_cache;
 mod self_check;
+mod submission;
 
 pub use context::DeviceSummary;
 pub use device::{Device, best_device, devices};
+pub use execute::{Done, Ticket};
