@@ -33,7 +33,8 @@ impl Renderer {
         for _ in 0..REPEATS {
             let status = work(self, &mut all)?;
             if status.again == 0 {
-                self.photon_need = self.photon_need.max([status.lane_need, status.batch_need]);
+                let [of_lane, of_batch] = self.photon_need;
+                self.photon_need = [of_lane.max(status.lane_need), of_batch.max(status.batch_need)];
                 return Ok((all, status));
             }
             self.counters.repeated_iterations += 1;
