@@ -27,6 +27,14 @@ pub trait Backend {
     /// # Errors
     /// As [`Backend::iterate`].
     fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>>;
+    /// The same, of a caller that will do another iteration before it asks for anything else: it may be begun already, so that
+    /// the device doesn't wait for the host.
+    ///
+    /// # Errors
+    /// As [`Backend::iterate`].
+    fn iterate_before_another(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
+        self.iterate_unless(stop)
+    }
     /// The picture so far (eq. 4), and what tells its bias.
     ///
     /// # Errors

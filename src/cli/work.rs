@@ -84,15 +84,26 @@ impl Work<'_> {
         let mut kept: Option<Kept> = None;
         let mut error = None;
         let mut failure = None;
-        // However short the time, there is a picture.
+        let mut has_begun = false;
+        // However short the time, there is a picture; and what the device was given ahead is waited for.
         while backend.iterations() == 0
+            || has_begun
             || !((self.asked)() || self.limits.done(backend.iterations(), start.elapsed(), error) >= 1.0)
         {
             let began = start.elapsed();
-            let done = backend.iterate_unless(&stop).and_then(|run| {
+            let next = backend.iterations() + 1;
+            let is_due = ErrorEstimate::is_due(next);
+            let is_last = self.limits.iterations.is_some_and(|most| next >= most);
+            let another = !(is_due || is_last || stop() || kept.as_ref().is_none_or(Kept::is_old));
+            has_begun = another;
+            let done = if another {
+                backend.iterate_before_another(&stop)
+            } else {
+                backend.iterate_unless(&stop)
+            };
+            let done = done.and_then(|run| {
                 let iterations = backend.iterations();
-                let is_due = ErrorEstimate::is_due(iterations);
-                if run.is_some() && (is_due || kept.as_ref().is_none_or(Kept::is_old)) {
+                if run.is_some() && !another && (is_due || kept.as_ref().is_none_or(Kept::is_old)) {
                     let made = Kept::make(backend, start)?;
                     if is_due {
                         error = self

@@ -61,15 +61,13 @@ impl Renderer {
         Ok(())
     }
 
-    /// Learns from the first of an iteration's paths, of which the first batch has had so many.
-    pub(super) fn learn(&mut self, iteration: u32, paths: u32) -> Result<()> {
-        if self.aim.is_some() {
-            let values = self.path_values(iteration, paths)?;
-            if let Some(aim) = &mut self.aim {
-                aim.learn(&self.config, iteration, 0, &values);
-            }
+    /// Learns from what the first of an iteration's paths were worth.
+    pub(super) fn learn(&mut self, iteration: u32, values: &[u32]) {
+        if let Some(aim) = &mut self.aim
+            && !values.is_empty()
+        {
+            aim.learn(&self.config, iteration, 0, values);
         }
-        Ok(())
     }
 
     /// What the first of an iteration's paths were worth, of which the first batch has had so many.

@@ -1,8 +1,14 @@
 //! Running an iteration: batch by batch, and again where something didn't fit.
 
+use bytemuck::Zeroable;
+
+use super::stages::reporting;
 use super::{Renderer, Stages};
+use crate::backend::Counters;
 use crate::config::Totals;
+use crate::emission::{counted_paths, is_learned_from};
 use crate::error::{Error, Result};
+use crate::gpu::{Done, Ticket};
 use crate::layout::{GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, StatusCounters};
 use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
@@ -10,6 +16,41 @@ use crate::stage::BufferId;
 
 /// How often an iteration is done at the most: every other time halves what its loops have to do.
 const REPEATS: u32 = 24;
+/// Nanoseconds that an iteration takes at the most for the next one to be begun before it is done: beside longer ones the
+/// host's gap is nothing, and who asks to stop would wait for both.
+const MOST_AHEAD_NS: f64 = 100e6;
+
+/// An iteration of one batch that the device was given.
+pub(super) struct Begun {
+    ticket: Ticket,
+    added: Totals,
+}
+
+/// What came of an iteration, or of its first batches.
+pub(super) struct Ended {
+    status: StatusCounters,
+    /// What counts: nothing where the iteration was cut short and is left out.
+    added: Totals,
+    /// What the first paths were worth, where that is learned from.
+    values: Vec<u32>,
+}
+
+/// Adds what the stages have reported since the status was `before`.
+fn count(counters: &mut Counters, before: &StatusCounters, now: &StatusCounters) {
+    let since = |of: fn(&StatusCounters) -> u32| u64::from(of(now).wrapping_sub(of(before)));
+    counters.photons_stored += now.photons_stored() - before.photons_stored();
+    counters.photons_landed += now.photons_landed() - before.photons_landed();
+    counters.truncated_paths += since(|status| status.truncated_paths);
+    counters.cut_paths += since(|status| status.cut_paths);
+    counters.non_finite += since(|status| status.non_finite);
+    counters.lost_photons += since(|status| status.lost_photons);
+    counters.full_cells += since(|status| status.full_cells);
+}
+
+fn status_of(done: &Done) -> Result<StatusCounters> {
+    let status = done.read(BufferId::Status).first().copied();
+    status.ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
+}
 
 impl Renderer {
     /// Runs what `record` says; where photons don't fit or loops are cut, makes room and does it again. Returns what all
@@ -19,13 +60,30 @@ impl Renderer {
         record: impl Fn(Stages<'_>) -> Recording,
     ) -> Result<(Run, StatusCounters)> {
         self.do_until_it_fits(|renderer, all| {
-            all.add(renderer.run(&record(renderer.stages()))?);
-            renderer.status()
+            let (run, status) = renderer.run_reporting(record(renderer.stages()))?;
+            all.add(run);
+            Ok(status)
         })
     }
 
+    /// Runs a recording that began with [`reporting`]; returns what it reported as well.
+    pub(super) fn run_reporting(&mut self, mut recording: Recording) -> Result<(Run, StatusCounters)> {
+        self.reported = None;
+        let ticket = self.submit(&mut recording)?;
+        let done = self.device.finish(ticket)?;
+        let status = status_of(&done)?;
+        Ok((done.run, status))
+    }
+
+    /// Gives the device a recording whose status comes back with it.
+    fn submit(&mut self, recording: &mut Recording) -> Result<Ticket> {
+        recording.read_back(BufferId::Status, u64::MAX);
+        self.make_buffers(recording)?;
+        self.device.begin(recording)
+    }
+
     /// The same of what is more than one recording: `work` adds what it took and returns the status.
-    pub(super) fn do_until_it_fits(
+    fn do_until_it_fits(
         &mut self,
         mut work: impl FnMut(&mut Self, &mut Run) -> Result<StatusCounters>,
     ) -> Result<(Run, StatusCounters)> {
@@ -38,6 +96,10 @@ impl Renderer {
                 return Ok((all, status));
             }
             self.counters.repeated_iterations += 1;
+            // It has stopped what came after it.
+            if let Some(begun) = self.ahead.take() {
+                all.add(self.device.finish(begun.ticket)?.run);
+            }
             self.make_room(&status)?;
         }
         Err(Error::Device(format!(
@@ -81,34 +143,145 @@ impl Renderer {
         self.upload_settings()
     }
 
+    /// Does an iteration, unless `stop` cuts it short; where the caller will do another one before it asks for a picture, the
+    /// device may be given that one already.
+    pub(super) fn do_iteration(&mut self, stop: &dyn Fn() -> bool, another: bool) -> Result<Option<Run>> {
+        let iteration = self.totals.iterations;
+        if self.ahead.is_none() {
+            self.fit_photon_buffers()?;
+            self.begin_block(iteration)?;
+        }
+        let (mut added, mut values) = (Totals::default(), Vec::new());
+        let (run, status) = self.do_until_it_fits(|renderer, all| {
+            let ended = renderer.attempt(iteration, stop, another, all)?;
+            (added, values) = (ended.added, ended.values);
+            Ok(ended.status)
+        })?;
+        self.iteration_ns = run.launches.iter().map(|launch| launch.duration_ns).sum();
+        if added.emitted == 0 {
+            return self.forget_gathered().map(|()| None);
+        }
+        self.take_in(iteration, &status, &values, added);
+        Ok(Some(run))
+    }
+
+    /// Counts an iteration as done.
+    fn take_in(&mut self, iteration: u32, status: &StatusCounters, values: &[u32], added: Totals) {
+        let before = self.reported.replace(*status).unwrap_or_else(StatusCounters::zeroed);
+        count(&mut self.counters, &before, status);
+        self.learn(iteration, values);
+        self.totals.add(added);
+    }
+
+    /// Takes in what the device was given ahead, before anything else is done with what it has.
+    pub(super) fn settle(&mut self) -> Result<()> {
+        let Some(begun) = self.ahead.take() else { return Ok(()) };
+        let iteration = self.totals.iterations;
+        let ended = self.end_of(begun, &mut Run::default())?;
+        if ended.status.again == 0 {
+            self.take_in(iteration, &ended.status, &ended.values, ended.added);
+            return Ok(());
+        }
+        self.forget_gathered()
+    }
+
+    /// Tries to do an iteration, of which the device may have been given everything.
+    fn attempt(&mut self, iteration: u32, stop: &dyn Fn() -> bool, another: bool, all: &mut Run) -> Result<Ended> {
+        let begun = match self.ahead.take() {
+            Some(begun) => begun,
+            None if self.sizes.batches(self.config.photons) == 1 => {
+                let recording = self.beginning();
+                self.begin_iteration(iteration, recording)?
+            }
+            None => return self.batches(iteration, stop, all),
+        };
+        if another && self.may_begin(iteration + 1) {
+            // Its stages report on top of what those of this one do, and do nothing where this one has to be done again.
+            self.ahead = Some(self.begin_iteration(iteration + 1, Recording::new())?);
+        }
+        self.end_of(begun, all)
+    }
+
+    /// Whether an iteration depends on nothing that the host does after the one before.
+    fn may_begin(&self, iteration: u32) -> bool {
+        let aims_anew = self.aim.is_some() && self.config.begins_sequences(iteration);
+        self.iteration_ns <= MOST_AHEAD_NS && self.fitted && !aims_anew
+    }
+
+    /// An empty recording, whose stages report on top of what the last iteration's did, or anew.
+    fn beginning(&self) -> Recording {
+        match self.reported {
+            Some(_) => Recording::new(),
+            None => reporting(),
+        }
+    }
+
+    /// Gives the device an iteration of one batch.
+    fn begin_iteration(&mut self, iteration: u32, mut recording: Recording) -> Result<Begun> {
+        let turn = CameraTurn::that_gathers(&self.config, iteration);
+        let stages = self.stages();
+        stages.begin(iteration, &mut recording);
+        stages.batch(iteration, 0, &mut recording);
+        let (ticket, added) = self.submit_end(turn, self.config.photons, recording)?;
+        Ok(Begun { ticket, added })
+    }
+
+    /// Gives the device an iteration's last commands, and what comes before them in the recording.
+    fn submit_end(&mut self, turn: CameraTurn, paths: u32, mut recording: Recording) -> Result<(Ticket, Totals)> {
+        self.stages().end(turn, paths, &mut recording);
+        if self.aim.is_some() && is_learned_from(&self.config, turn.iteration) {
+            let counted = self.sizes.batch_paths.min(counted_paths(turn.iteration));
+            recording.read_back(BufferId::PathValues, 4 * u64::from(counted));
+        }
+        let ticket = self.submit(&mut recording)?;
+        let added = Totals {
+            iterations: 1,
+            emitted: paths.into(),
+            camera_paths: turn.paths,
+        };
+        Ok((ticket, added))
+    }
+
+    fn end_of(&mut self, Begun { ticket, added }: Begun, all: &mut Run) -> Result<Ended> {
+        let done = self.device.finish(ticket)?;
+        let ended = Ended {
+            status: status_of(&done)?,
+            added,
+            values: done.read(BufferId::PathValues),
+        };
+        all.add(done.run);
+        Ok(ended)
+    }
+
     /// Runs an iteration, each batch of photons by itself: a device that is given minutes of work at once is taken for dead,
-    /// and nothing could stop it. Returns the last status, and what counts: nothing where the iteration was cut short and is left
-    /// out.
-    pub(super) fn batches(
-        &mut self,
-        iteration: u32,
-        stop: &dyn Fn() -> bool,
-        all: &mut Run,
-    ) -> Result<(StatusCounters, Totals)> {
+    /// and nothing could stop it.
+    fn batches(&mut self, iteration: u32, stop: &dyn Fn() -> bool, all: &mut Run) -> Result<Ended> {
         let photons = self.config.photons;
         let batches = self.sizes.batches(photons);
         let mut turn = CameraTurn::that_gathers(&self.config, iteration);
-        let mut recording = self.stages().begin(iteration);
+        let mut recording = self.beginning();
+        self.stages().begin(iteration, &mut recording);
         let mut paths = photons;
         for batch in 0..batches {
             self.stages().batch(iteration, batch, &mut recording);
             if batch + 1 == batches {
                 break;
             }
-            all.add(self.run(&recording)?);
+            let ticket = self.submit(&mut recording)?;
+            let ended = self.end_of(
+                Begun {
+                    ticket,
+                    added: Totals::default(),
+                },
+                all,
+            )?;
             recording = Recording::new();
-            let status = self.status()?;
-            if status.again != 0 {
-                return Ok((status, Totals::default()));
+            if ended.status.again != 0 {
+                return Ok(ended);
             }
             if stop() {
                 if iteration > 0 {
-                    return Ok((status, Totals::default()));
+                    return Ok(ended);
                 }
                 paths = (batch + 1) * self.sizes.batch_paths;
                 // More camera paths could take longer than what was cut.
@@ -116,13 +289,10 @@ impl Renderer {
                 break;
             }
         }
-        self.stages().end(turn, paths, &mut recording);
-        all.add(self.run(&recording)?);
-        let added = Totals {
-            iterations: 1,
-            emitted: paths.into(),
-            camera_paths: turn.paths,
-        };
-        Ok((self.status()?, added))
+        let (ticket, added) = self.submit_end(turn, paths, recording)?;
+        self.end_of(Begun { ticket, added }, all)
     }
 }
+
+#[cfg(test)]
+mod tests;

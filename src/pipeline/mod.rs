@@ -6,13 +6,14 @@ mod memory;
 mod radii;
 mod stages;
 
+use iteration::Begun;
 pub use memory::Memory;
 use memory::{bindable_bytes, limits, scene_buffers};
 pub use stages::Stages;
 
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Accel, Limits, Probe, RenderConfig, Sizes, Totals};
-use crate::emission::{Aim, is_learned_from};
+use crate::emission::Aim;
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, default_method, grid_sizes};
 use crate::gpu::Device;
@@ -44,6 +45,12 @@ pub struct Renderer {
     aim: Option<Aim>,
     /// Launches that a gather outside a render is dealt to, for each of [`METHODS`].
     parts_of_methods: Vec<u32>,
+    /// What the status said after the last iteration, where nothing else has been run since.
+    reported: Option<StatusCounters>,
+    /// An iteration that the device was given ahead of its turn.
+    ahead: Option<Begun>,
+    /// Nanoseconds that the last iteration's launches took.
+    iteration_ns: f64,
 }
 
 impl Renderer {
@@ -112,6 +119,9 @@ impl Renderer {
             fitted: false,
             aim: None,
             parts_of_methods: vec![1; METHODS.len()],
+            reported: None,
+            ahead: None,
+            iteration_ns: f64::INFINITY,
         };
         renderer.upload_settings()?;
         // Before any work: memory that lacks is told now and not after an hour.
@@ -129,15 +139,6 @@ impl Renderer {
             sizes: &self.sizes,
             features: self.features,
         }
-    }
-
-    /// What the last recording that began with [`reporting`] reported.
-    fn status(&mut self) -> Result<StatusCounters> {
-        let status: Vec<StatusCounters> = self.device.download(BufferId::Status, Some(1))?;
-        status
-            .first()
-            .copied()
-            .ok_or_else(|| Error::Device("the status buffer is empty".to_owned()))
     }
 
     /// Finds the first visible points and traces a batch of the first photons, for gathers to be tried on. Returns what
@@ -163,9 +164,9 @@ impl Renderer {
     /// # Errors
     /// As [`Backend::resolve`].
     pub fn picture(&mut self) -> Result<(Run, Resolved)> {
+        self.settle()?;
         let recording = self.stages().picture(self.totals);
-        let run = self.run(&recording)?;
-        let status = self.status()?;
+        let (run, status) = self.run_reporting(recording)?;
         self.counters.non_finite += u64::from(status.non_finite);
         self.counters.photons_accepted = status.photons_accepted();
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
@@ -245,6 +246,7 @@ impl Renderer {
     /// # Errors
     /// A device without enough memory, or a failed Vulkan call.
     pub fn run(&mut self, recording: &Recording) -> Result<Run> {
+        self.reported = None;
         self.make_buffers(recording)?;
         self.device.run(recording)
     }
@@ -252,31 +254,11 @@ impl Renderer {
 
 impl Backend for Renderer {
     fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
-        self.fit_photon_buffers()?;
-        let iteration = self.totals.iterations;
-        self.begin_block(iteration)?;
-        let mut added = Totals::default();
-        let (run, status) = self.do_until_it_fits(|renderer, all| {
-            let (status, of_batches) = renderer.batches(iteration, stop, all)?;
-            added = of_batches;
-            Ok(status)
-        })?;
-        let counters = &mut self.counters;
-        if added.emitted == 0 {
-            return self.forget_gathered().map(|()| None);
-        }
-        counters.photons_stored += status.photons_stored();
-        counters.truncated_paths += u64::from(status.truncated_paths);
-        counters.cut_paths += u64::from(status.cut_paths);
-        counters.non_finite += u64::from(status.non_finite);
-        counters.lost_photons += u64::from(status.lost_photons);
-        counters.full_cells += u64::from(status.full_cells);
-        counters.photons_landed += status.photons_landed();
-        if is_learned_from(&self.config, iteration) {
-            self.learn(iteration, self.sizes.batch_paths)?;
-        }
-        self.totals.add(added);
-        Ok(Some(run))
+        self.do_iteration(stop, false)
+    }
+
+    fn iterate_before_another(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
+        self.do_iteration(stop, true)
     }
 
     fn resolve_all(&mut self) -> Result<Resolved> {

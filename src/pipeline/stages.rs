@@ -42,7 +42,8 @@ pub(super) fn reporting() -> Recording {
 impl Stages<'_> {
     /// The commands of an iteration.
     pub fn iteration(&self, iteration: u32) -> Recording {
-        let mut recording = self.begin(iteration);
+        let mut recording = reporting();
+        self.begin(iteration, &mut recording);
         for batch in 0..self.sizes.batches(self.config.photons) {
             self.batch(iteration, batch, &mut recording);
         }
@@ -53,7 +54,8 @@ impl Stages<'_> {
 
     /// The commands of an iteration of one batch: they touch the buffers that one of any number does.
     pub fn shortest_iteration(&self) -> Recording {
-        let mut recording = self.begin(0);
+        let mut recording = reporting();
+        self.begin(0, &mut recording);
         self.batch(0, 0, &mut recording);
         let turn = CameraTurn::that_gathers(self.config, 0);
         self.end(turn, self.config.photons, &mut recording);
@@ -61,17 +63,15 @@ impl Stages<'_> {
     }
 
     /// What comes before an iteration's photons.
-    pub(super) fn begin(&self, iteration: u32) -> Recording {
-        let mut recording = reporting();
+    pub(super) fn begin(&self, iteration: u32, recording: &mut Recording) {
         let (order, _) = self.method();
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
             let turn = CameraTurn::that_gathers(self.config, iteration);
-            self.camera(turn, &mut recording);
-            order(self.sizes, &mut recording);
+            self.camera(turn, recording);
+            order(self.sizes, recording);
         }
-        self.radii(&mut recording);
-        self.demand(iteration, &mut recording);
-        recording
+        self.radii(recording);
+        self.demand(iteration, recording);
     }
 
     /// A batch of an iteration's photons.
