@@ -132,7 +132,7 @@ pub enum BufferId {
     OtherKeys,
     /// Values after every other pass.
     OtherValues,
-    /// Digit counts of a sort pass, u32, `[digit][tile]`.
+    /// Digit counts of a sort pass, u32, `[digit][tile]`, and past the last tile those of all.
     Histograms,
     /// Block sums of a prefix sum, u32.
     ScanSums,

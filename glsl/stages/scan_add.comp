@@ -1,8 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Exclusive prefix sums, last of three stages: adds to each block what lies before it.
+// Exclusive prefix sums, last of two stages: every workgroup adds to a block what lies before it, which it sums up from the
+// blocks' sums by itself. These are few: to read them often takes less time than one more launch.
 
-layout(local_size_x = 128) in;
+layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 
@@ -14,10 +15,27 @@ layout(push_constant) uniform Push {
 
 layout(std430) buffer Scan { uint scan[]; };
 layout(std430) readonly buffer ScanSums { uint scan_sums[]; };
+layout(std430) writeonly buffer ScanTotal { uint scan_total; };
+
+#include "workgroup_scan.glsl"
 
 void main() {
-    uint i = invocation_index();
-    if (i < push.count) {
-        scan[i] += scan_sums[i / BLOCK];
+    uint me = gl_LocalInvocationID.x;
+    uint block = workgroup_index();
+    if (block * BLOCK >= push.count) {
+        return;
+    }
+    uint part = 0u;
+    for (uint i = me; i < block; i += gl_WorkGroupSize.x) {
+        part += scan_sums[i];
+    }
+    uint before;
+    workgroup_exclusive_scan(part, before);
+    uint end = min(block * BLOCK + BLOCK, push.count);
+    for (uint i = block * BLOCK + me; i < end; i += gl_WorkGroupSize.x) {
+        scan[i] += before;
+    }
+    if (me == 0u && end == push.count) {
+        scan_total = before + scan_sums[block];
     }
 }

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Exclusive prefix sums, first of three stages: every workgroup scans a block of 2,048 numbers in place and notes
+// Exclusive prefix sums, first of two stages: every workgroup scans a block of 2,048 numbers in place and notes
 // the block's sum.
 
 layout(local_size_x = 128) in;

@@ -5,40 +5,30 @@
 layout(local_size_x = 128) in;
 
 #include "invocation.glsl"
-
-layout(push_constant) uniform Push {
-    uint shift;
-    uint tiles;
-} push;
-
 #include "sort.glsl"
 
 layout(std430) readonly buffer KeysIn { uint keys_in[]; };
-layout(std430) writeonly buffer Histograms { uint histograms[]; }; // digit-major: [digit][tile]
+layout(std430) writeonly buffer Histograms { uint histograms[]; };
 
-shared uint counts[DIGITS];
+shared uint counts[MOST_DIGITS];
 
 void main() {
     uint me = gl_LocalInvocationID.x;
-    // Room for more keys than there are costs little.
-    if (workgroup_index() * TILE_KEYS >= sort_count) {
-        if (me < DIGITS && workgroup_index() < push.tiles) {
-            histograms[me * push.tiles + workgroup_index()] = 0u;
-        }
+    uint first = workgroup_index() * TILE_KEYS;
+    // Room for more keys than there are costs nothing.
+    if (first >= sort_count) {
         return;
     }
-    if (me < DIGITS) {
-        counts[me] = 0u;
+    for (uint digit = me; digit < digits(); digit += gl_WorkGroupSize.x) {
+        counts[digit] = 0u;
     }
     barrier();
-    for (uint i = 0u; i < KEYS_PER_THREAD; i++) {
-        uint index = workgroup_index() * TILE_KEYS + i * gl_WorkGroupSize.x + me;
-        if (index < sort_count) {
-            atomicAdd(counts[digit_of(keys_in[index], push.shift)], 1u);
-        }
+    uint end = min(first + TILE_KEYS, sort_count);
+    for (uint i = first + me; i < end; i += gl_WorkGroupSize.x) {
+        atomicAdd(counts[digit_of(keys_in[i])], 1u);
     }
     barrier();
-    if (me < DIGITS && workgroup_index() < push.tiles) {
-        histograms[me * push.tiles + workgroup_index()] = counts[me];
+    for (uint digit = me; digit < digits(); digit += gl_WorkGroupSize.x) {
+        histograms[histogram_of(digit, workgroup_index())] = counts[digit];
     }
 }

@@ -35,8 +35,8 @@ const RADIUS_SAMPLES: u32 = 1 << 16;
 pub const SCAN_BLOCK: u32 = 2048;
 /// Keys of a tile of the radix sort.
 pub const SORT_TILE: u32 = 2048;
-/// Bits of a digit of the radix sort.
-pub const SORT_DIGIT_BITS: u32 = 5;
+/// Bits of a digit of the radix sort, at the most.
+pub const SORT_DIGIT_BITS: u32 = 8;
 
 /// The head, the spheres, the cells.
 const EMISSION_TABLE_BYTES: usize =
@@ -227,11 +227,12 @@ impl Sizes {
         let photons = u64::from(self.photon_capacity);
         let lanes = u64::from(self.photon_lanes);
         let tiles = photons.max(slots).div_ceil(u64::from(SORT_TILE));
-        let histograms = tiles << SORT_DIGIT_BITS;
+        // One number more than tiles for each digit.
+        let histograms = (tiles + 1) << SORT_DIGIT_BITS;
         let cells = (1u64 << self.cell_bits) + 1;
         let (meshes, object_cells) = (u64::from(self.meshes), u64::from(self.object_cells) + 1);
         let runs = u64::from(self.runs());
-        let scanned = [histograms, lanes, cells, meshes, object_cells, runs];
+        let scanned = [lanes, cells, meshes, object_cells, runs];
         let scan_blocks = scanned.map(|count| count.div_ceil(u64::from(SCAN_BLOCK)));
         let (count, size) = match id {
             BufferId::VisiblePoints => (slots, size_of::<VisiblePoint>()),

@@ -16,9 +16,9 @@ pub fn scan(buffer: BufferId, count: u32, recording: &mut Recording) {
             .push(count)
             .bind(bound.to_vec()),
     );
-    recording.dispatch(StageDesc::new(&shaders::SCAN_SUMS, shaders::SCAN_SUMS.workgroup).push(blocks));
+    let threads = blocks * shaders::SCAN_ADD.workgroup;
     recording.dispatch(
-        StageDesc::new(&shaders::SCAN_ADD, count)
+        StageDesc::new(&shaders::SCAN_ADD, threads)
             .push(count)
             .bind(bound.to_vec()),
     );
@@ -63,8 +63,9 @@ pub const POINT_PAIRS: [Pairs; 2] = [
 pub fn sort(count: BufferId, capacity: u32, bits: u32, pairs: [Pairs; 2], recording: &mut Recording) -> [Pairs; 2] {
     let tiles = capacity.div_ceil(SORT_TILE);
     let [mut here, mut there] = pairs;
-    for pass in 0..bits.div_ceil(SORT_DIGIT_BITS) {
-        let push = [pass * SORT_DIGIT_BITS, tiles];
+    let digit_bits = bits.div_ceil(bits.div_ceil(SORT_DIGIT_BITS).max(1));
+    for shift in (0..bits).step_by(digit_bits.max(1) as usize) {
+        let pass_bits = digit_bits.min(bits - shift);
         let bound = vec![
             (BufferId::SortCount, count),
             (BufferId::KeysIn, here.keys),
@@ -72,19 +73,17 @@ pub fn sort(count: BufferId, capacity: u32, bits: u32, pairs: [Pairs; 2], record
             (BufferId::KeysOut, there.keys),
             (BufferId::ValuesOut, there.values),
         ];
-        let count_threads = tiles * shaders::SORT_COUNT.workgroup;
-        recording.dispatch(
-            StageDesc::new(&shaders::SORT_COUNT, count_threads)
-                .push(push)
-                .bind(bound.clone()),
-        );
-        scan(BufferId::Histograms, tiles << SORT_DIGIT_BITS, recording);
-        let scatter_threads = tiles * shaders::SORT_SCATTER.workgroup;
-        recording.dispatch(
-            StageDesc::new(&shaders::SORT_SCATTER, scatter_threads)
-                .push(push)
-                .bind(bound),
-        );
+        for (shader, groups) in [
+            (&shaders::SORT_COUNT, tiles),
+            (&shaders::SORT_ROWS, 1 << pass_bits),
+            (&shaders::SORT_SCATTER, tiles),
+        ] {
+            recording.dispatch(
+                StageDesc::new(shader, groups * shader.workgroup)
+                    .push([shift, pass_bits, tiles])
+                    .bind(bound.clone()),
+            );
+        }
         std::mem::swap(&mut here, &mut there);
     }
     [here, there]

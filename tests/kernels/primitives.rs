@@ -82,13 +82,11 @@ fn assert_sorts(device: &mut Device, case: &str, keys: Vec<u32>, capacity: usize
     device
         .upload(BufferId::PhotonCount, &[count as u32])
         .expect("an upload");
-    let histograms = (capacity as u32).div_ceil(SORT_TILE) << SORT_DIGIT_BITS;
+    let histograms = ((capacity as u32).div_ceil(SORT_TILE) + 1) << SORT_DIGIT_BITS;
     for (id, words) in [
         (BufferId::OtherKeys, capacity as u32),
         (BufferId::OtherValues, capacity as u32),
         (BufferId::Histograms, histograms),
-        (BufferId::ScanSums, histograms.div_ceil(SCAN_BLOCK)),
-        (BufferId::ScanTotal, 1),
     ] {
         device.create(id, u64::from(words) * 4).expect("a buffer");
     }
@@ -119,7 +117,8 @@ fn a_sort_is_exact_and_stable() {
     let mut device = device();
     let capacity = 20_000;
     // The low 12 bits occur five times each: their values show whether the order of equal keys is kept.
-    for bits in [12, 20, 32] {
+    // Of one pass, of several, by digits of all lengths.
+    for bits in [1, 4, 5, 8, 9, 12, 20, 22, 32] {
         let mask = u32::MAX >> (32 - bits);
         let random: Vec<u32> = random_words(capacity, bits).iter().map(|word| word & mask).collect();
         let mut sorted = random.clone();

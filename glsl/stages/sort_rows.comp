@@ -1,0 +1,39 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Radix sort, second stage of a pass: every workgroup replaces a digit's counts of the tiles by those of the tiles before, and
+// notes how often it occurs in all.
+
+layout(local_size_x = 64) in;
+
+#include "invocation.glsl"
+#include "sort.glsl"
+
+layout(std430) buffer Histograms { uint histograms[]; };
+
+#include "workgroup_scan.glsl"
+
+void main() {
+    uint me = gl_LocalInvocationID.x;
+    uint digit = workgroup_index();
+    if (digit >= digits()) {
+        return;
+    }
+    uint tiles = (sort_count + TILE_KEYS - 1u) / TILE_KEYS;
+    uint per_thread = (tiles + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x;
+    uint first = histogram_of(digit, min(me * per_thread, tiles));
+    uint end = histogram_of(digit, min((me + 1u) * per_thread, tiles));
+    uint sum = 0u;
+    for (uint i = first; i < end; i++) {
+        sum += histograms[i];
+    }
+    uint total;
+    uint before = workgroup_exclusive_scan(sum, total);
+    for (uint i = first; i < end; i++) {
+        uint count = histograms[i];
+        histograms[i] = before;
+        before += count;
+    }
+    if (me == 0u) {
+        histograms[histogram_of(digit, push.tiles)] = total;
+    }
+}
