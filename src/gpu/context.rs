@@ -4,7 +4,7 @@ use std::ffi::{CStr, CString, c_void};
 use std::mem::ManuallyDrop;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 use serde::Serialize;
@@ -52,6 +52,8 @@ pub struct DeviceSummary {
     pub max_texels: u32,
     /// Bytes of shared memory of a workgroup.
     pub max_shared_memory_bytes: u32,
+    /// Bytes that can be allocated at once.
+    pub max_allocation_bytes: u64,
     /// What the device lacks to run the program; empty if nothing.
     pub lacks: Vec<String>,
 }
@@ -87,6 +89,10 @@ unsafe extern "system" fn on_message(
         }
     }
     vk::FALSE
+}
+
+fn has(extensions: &[vk::ExtensionProperties], name: &CStr) -> bool {
+    extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name))
 }
 
 /// The instance that is alive, if one is. Loaders have been seen to crash where one thread makes an instance while
@@ -126,10 +132,9 @@ impl Instance {
             let extensions = entry
                 .enumerate_instance_extension_properties(None)
                 .or_vulkan("vkEnumerateInstanceExtensionProperties")?;
-            let debug_utils = validate
-                || extensions
-                    .iter()
-                    .any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+            let debug_utils = validate || has(&extensions, ext::debug_utils::NAME);
+            // MoltenVK is listed to those alone who say that they know of it.
+            let portability = has(&extensions, khr::portability_enumeration::NAME);
             let application = vk::ApplicationInfo::default()
                 .application_name(c"ppm-vk")
                 .api_version(API_VERSION);
@@ -142,6 +147,9 @@ impl Instance {
             if debug_utils {
                 extension_names.push(ext::debug_utils::NAME.as_ptr());
             }
+            if portability {
+                extension_names.push(khr::portability_enumeration::NAME.as_ptr());
+            }
             let checks = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
             let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
             if validate {
@@ -153,6 +161,9 @@ impl Instance {
                 .enabled_extension_names(&extension_names);
             if validate {
                 create = create.push_next(&mut features);
+            }
+            if portability {
+                create = create.flags(vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR);
             }
             let handle = entry.create_instance(&create, None).map_err(|code| {
                 Error::Device(format!(
@@ -206,8 +217,10 @@ impl Instance {
     fn summary(&self, index: usize, device: vk::PhysicalDevice) -> DeviceSummary {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
         let mut properties = vk::PhysicalDeviceProperties2::default()
             .push_next(&mut subgroup)
+            .push_next(&mut maintenance)
             .push_next(&mut driver);
         // SAFETY: the device belongs to this instance.
         unsafe { self.handle.get_physical_device_properties2(device, &mut properties) };
@@ -266,6 +279,7 @@ impl Instance {
             max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
             max_texels: limits.max_texel_buffer_elements,
             max_shared_memory_bytes: limits.max_compute_shared_memory_size,
+            max_allocation_bytes: maintenance.max_memory_allocation_size,
             lacks,
         }
     }
@@ -322,9 +336,20 @@ impl Context {
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(family)
             .queue_priorities(&priorities)];
-        let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
         // SAFETY: the physical device belongs to the instance, which the context keeps alive.
         unsafe {
+            let extensions = instance
+                .handle
+                .enumerate_device_extension_properties(physical)
+                .or_vulkan("vkEnumerateDeviceExtensionProperties")?;
+            let mut names = Vec::new();
+            // A device that has it (MoltenVK) demands it. None of what such a device may lack is used here.
+            if has(&extensions, khr::portability_subset::NAME) {
+                names.push(khr::portability_subset::NAME.as_ptr());
+            }
+            let create = vk::DeviceCreateInfo::default()
+                .queue_create_infos(&queues)
+                .enabled_extension_names(&names);
             let device = instance
                 .handle
                 .create_device(physical, &create, None)

@@ -158,7 +158,7 @@ impl Device {
 }
 
 /// What makes a buffer smaller.
-fn advice(id: BufferId) -> &'static str {
+pub(crate) fn advice(id: BufferId) -> &'static str {
     match id {
         BufferId::Textures | BufferId::Texels => {
             "make the scene's textures smaller, or use another --device or --backend cpu"
@@ -205,12 +205,7 @@ fn choose(
         ));
     }
     let position = match choice {
-        Some(choice) => match choice.parse::<usize>() {
-            Ok(index) => devices.iter().position(|(_, summary)| summary.index == index),
-            Err(_) => devices
-                .iter()
-                .position(|(_, summary)| summary.name.to_lowercase().contains(&choice.to_lowercase())),
-        },
+        Some(choice) => named(&devices, choice)?,
         None => (0..devices.len()).min_by_key(|&i| {
             let summary = &devices[i].1;
             let rank = ["discrete", "integrated", "virtual", "other", "cpu"];
@@ -229,6 +224,37 @@ fn choose(
         ))
     })?;
     Ok(devices.swap_remove(position))
+}
+
+/// The place of the device that a user means: by its index, its name, or a part of its name that no other device's has.
+fn named(devices: &[(vk::PhysicalDevice, DeviceSummary)], choice: &str) -> Result<Option<usize>> {
+    let index: Option<usize> = choice.parse().ok();
+    if let Some(found) = devices.iter().position(|(_, summary)| Some(summary.index) == index) {
+        return Ok(Some(found));
+    }
+    let choice = choice.to_lowercase();
+    let places = |is_meant: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        (0..devices.len())
+            .filter(|&i| is_meant(&devices[i].1.name.to_lowercase()))
+            .collect()
+    };
+    let whole = places(&|name| name == choice);
+    let found = if whole.is_empty() {
+        places(&|name| name.contains(&choice))
+    } else {
+        whole
+    };
+    if let [_, _, ..] = found[..] {
+        let names: Vec<String> = found
+            .iter()
+            .map(|&i| format!("{}: {}", devices[i].1.index, devices[i].1.name))
+            .collect();
+        return Err(Error::Device(format!(
+            "--device {choice} may be {}; give more of the name, or the index",
+            names.join(", ")
+        )));
+    }
+    Ok(found.first().copied())
 }
 
 impl Drop for Device {
@@ -262,6 +288,7 @@ mod tests {
             max_storage_buffer_bytes: 1 << 27,
             max_texels: 1 << 16,
             max_shared_memory_bytes: 1 << 14,
+            max_allocation_bytes: 1 << 30,
             lacks: lacks.iter().map(|&what| what.to_owned()).collect(),
         };
         (vk::PhysicalDevice::null(), summary)
@@ -288,6 +315,27 @@ mod tests {
     fn a_device_is_found_by_index_and_by_a_part_of_its_name() {
         assert_eq!(chosen(Some("0")).ok(), Some(0));
         assert_eq!(chosen(Some("old card")).ok(), Some(1));
+    }
+
+    #[test]
+    fn a_number_that_is_no_index_is_a_part_of_a_name() {
+        let mut devices = three();
+        devices.push(device(3, "GeForce RTX 4090", "discrete", &[]));
+        let found = choose(devices, Some("4090")).map(|(_, summary)| summary.index);
+        assert_eq!(found.ok(), Some(3));
+    }
+
+    #[test]
+    fn a_name_that_several_devices_have_is_told_with_all_of_them_unless_it_is_whole() {
+        let error = chosen(Some("CARD")).expect_err("two cards").to_string();
+        assert!(
+            error.contains("1: Old Card") && error.contains("2: Small Card") && !error.contains("llvmpipe"),
+            "{error}"
+        );
+        let mut devices = three();
+        devices.push(device(3, "Old Card D", "discrete", &[]));
+        let found = choose(devices, Some("old card")).map(|(_, summary)| summary.index);
+        assert_eq!(found.ok(), Some(1));
     }
 
     #[test]
