@@ -13,5 +13,6 @@ mod self_check;
 mod submission;
 
 pub use context::DeviceSummary;
+pub(crate) use device::advice;
 pub use device::{Device, best_device, devices};
 pub use execute::{Done, Ticket};

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::stages::Stages;
-use crate::config::{Limits, RUN_ON_CPU, RenderConfig, Sizes, Totals};
+use crate::config::{Limits, RUN_ON_CPU, RenderConfig, Sizes, Totals, TriangleTest};
 use crate::gpu::DeviceSummary;
 use crate::layout::Settings;
 use crate::scene::PackedScene;
@@ -45,7 +45,10 @@ impl Memory {
         };
         Self {
             caustic_map: of_maps.map(caustic_map).iter().sum(),
-            scene: scene_buffers(scene).iter().map(|(_, bytes)| bytes.len() as u64).sum(),
+            scene: scene_buffers(scene, config.triangle_test)
+                .iter()
+                .map(|(_, bytes)| bytes.len() as u64)
+                .sum(),
             render: render + size_of::<Settings>() as u64,
         }
     }
@@ -57,9 +60,12 @@ fn loop_budget(limit: u32) -> u32 {
     if limit == u32::MAX { limit } else { limit / 4 }
 }
 
-/// Bytes that a stage can see of a buffer, as words or as texels.
+/// Bytes that a buffer can have and a stage can see of it, as words or as texels.
 pub(super) fn bindable_bytes(device: &DeviceSummary) -> u64 {
-    device.max_storage_buffer_bytes.min(16 * u64::from(device.max_texels))
+    device
+        .max_storage_buffer_bytes
+        .min(16 * u64::from(device.max_texels))
+        .min(device.max_allocation_bytes)
 }
 
 /// What the sizes of a render of a scene depend on.
@@ -77,11 +83,18 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
     }
 }
 
-/// The buffers that hold the scene.
-pub(super) fn scene_buffers(scene: &PackedScene) -> [(BufferId, &[u8]); 14] {
+/// The buffers that hold the scene, of which the paper's triangles are only there to be bound where no ray is tested with them.
+pub(super) fn scene_buffers(scene: &PackedScene, test: TriangleTest) -> [(BufferId, &[u8]); 14] {
+    let havel = match test {
+        TriangleTest::Havel => scene.havel_triangles.len(),
+        TriangleTest::Watertight => scene.havel_triangles.len().min(1),
+    };
     [
         (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
-        (BufferId::HavelTriangles, bytemuck::cast_slice(&scene.havel_triangles)),
+        (
+            BufferId::HavelTriangles,
+            bytemuck::cast_slice(&scene.havel_triangles[..havel]),
+        ),
         (
             BufferId::ShadingTriangles,
             bytemuck::cast_slice(&scene.shading_triangles),

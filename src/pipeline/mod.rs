@@ -1,11 +1,13 @@
 //! A render on a Vulkan device. [`Stages::iteration`] has the order of the stages: it reads like figure 1 of the paper.
 
 mod aim;
+mod fitting;
 mod iteration;
 mod memory;
 mod radii;
 mod stages;
 
+use fitting::check_fits;
 use iteration::Begun;
 pub use memory::Memory;
 use memory::{bindable_bytes, limits, scene_buffers};
@@ -96,7 +98,8 @@ impl Renderer {
             )));
         }
         let sizes = Sizes::new(&config, limits);
-        for (id, bytes) in scene_buffers(scene) {
+        check_fits(scene, &config, device.summary(), limits)?;
+        for (id, bytes) in scene_buffers(scene, config.triangle_test) {
             device.upload(id, bytes)?;
         }
         let settings = settings(&config, scene, camera, limits.loop_limit);

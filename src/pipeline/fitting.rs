@@ -1,0 +1,180 @@
+//! Whether a device can have a render's buffers: told before anything is uploaded or compiled, with what to do.
+
+use std::collections::BTreeMap;
+
+use super::memory::scene_buffers;
+use super::stages::Stages;
+use crate::config::{Limits, RenderConfig, Sizes, Totals};
+use crate::error::{Error, Result};
+use crate::gpu::{DeviceSummary, advice};
+use crate::record::{Command, Recording};
+use crate::scene::PackedScene;
+use crate::stage::{Access, BufferId};
+use crate::text;
+
+/// A buffer that a device can't have.
+struct TooLarge {
+    id: BufferId,
+    bytes: u64,
+    /// What the device can.
+    most: String,
+}
+
+/// Tells the first buffer that doesn't fit, and what makes it smaller.
+pub(super) fn check_fits(
+    scene: &PackedScene,
+    config: &RenderConfig,
+    device: &DeviceSummary,
+    limits: Limits,
+) -> Result<()> {
+    let Some(TooLarge { id, bytes, most }) = too_large(scene, config, device, limits) else {
+        return Ok(());
+    };
+    let smaller = (1..64)
+        .map(|step| {
+            let side = |side: u32| ((f64::from(side) * 0.9_f64.powi(step)) as u32).max(1);
+            config.resolution.map(side)
+        })
+        .find(|&resolution| {
+            let config = RenderConfig {
+                resolution,
+                ..config.clone()
+            };
+            too_large(scene, &config, device, limits).is_none()
+        });
+    let advice = match smaller {
+        Some([width, height]) => format!("try --resolution {width}x{height}, or another --device or --backend cpu"),
+        None => advice(id).to_owned(),
+    };
+    Err(Error::Device(format!(
+        "{id:?} needs {}, device {} {most}; {advice}",
+        text::bytes(bytes),
+        device.name
+    )))
+}
+
+fn too_large(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary, limits: Limits) -> Option<TooLarge> {
+    let sizes = Sizes::new(config, limits);
+    let stages = Stages {
+        config,
+        sizes: &sizes,
+        features: scene.features,
+    };
+    let of_scene: BTreeMap<BufferId, u64> = scene_buffers(scene, config.triangle_test)
+        .iter()
+        .map(|(id, bytes)| (*id, bytes.len() as u64))
+        .collect();
+    let recordings = [stages.shortest_iteration(), stages.picture(Totals::default())];
+    uses(&recordings).into_iter().find_map(|(id, as_texels)| {
+        let bytes = sizes.bytes(id).or_else(|| of_scene.get(&id).copied())?;
+        let (texels, storage) = (u64::from(device.max_texels), device.max_storage_buffer_bytes);
+        let most = if as_texels && bytes / 16 > texels {
+            format!("reads {texels} texels of 16 bytes at most")
+        } else if bytes > storage {
+            format!("binds {} at most", text::bytes(storage))
+        } else if bytes > device.max_allocation_bytes {
+            format!("allocates {} at once at most", text::bytes(device.max_allocation_bytes))
+        } else {
+            return None;
+        };
+        Some(TooLarge { id, bytes, most })
+    })
+}
+
+/// The buffers that launches use, and whether one reads them as texels.
+fn uses(recordings: &[Recording]) -> BTreeMap<BufferId, bool> {
+    let mut uses = BTreeMap::new();
+    for command in recordings.iter().flat_map(Recording::commands) {
+        if let Command::Dispatch(stage) = command {
+            for (_, id, access) in stage.uses() {
+                *uses.entry(id).or_default() |= access == Access::Texels;
+            }
+        }
+    }
+    uses
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::pipeline::memory::limits;
+    use crate::scene::Scene;
+
+    fn device(max_texels: u32, max_allocation_bytes: u64) -> DeviceSummary {
+        DeviceSummary {
+            index: 0,
+            name: "Small Card".to_owned(),
+            driver: String::new(),
+            kind: "cpu",
+            api_version: "1.3.0".to_owned(),
+            timestamp_period_ns: 1.0,
+            subgroup_size: 4,
+            max_storage_buffer_bytes: 1 << 30,
+            max_texels,
+            max_shared_memory_bytes: 1 << 14,
+            max_allocation_bytes,
+            lacks: Vec::new(),
+        }
+    }
+
+    fn check(name: &str, resolution: [u32; 2], device: &DeviceSummary) -> Result<()> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("scenes")
+            .join(name)
+            .with_extension("gltf");
+        let scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
+        let scene = PackedScene::new(&scene).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let config = RenderConfig {
+            resolution,
+            ..RenderConfig::default()
+        };
+        check_fits(&scene, &config, device, limits(device, u32::MAX, &scene))
+    }
+
+    /// The resolution that an error advises.
+    fn advised(error: &str) -> [u32; 2] {
+        let after = error.split("--resolution ").nth(1).expect("a resolution");
+        let size = after.split(',').next().expect("a resolution");
+        let sides: Vec<u32> = size.split('x').map(|side| side.parse().expect("a side")).collect();
+        [sides[0], sides[1]]
+    }
+
+    #[test]
+    fn a_picture_of_more_texels_than_a_device_reads_is_told_with_one_that_fits() {
+        // As SwiftShader has it.
+        let swift = device(1 << 16, 1 << 30);
+        check("cornell", [64, 64], &swift).expect("64x64 fits");
+        let error = check("cornell", [640, 480], &swift)
+            .expect_err("640x480 doesn't")
+            .to_string();
+        assert!(
+            error.contains("65536 texels") && error.contains("Small Card"),
+            "{error}"
+        );
+        let fits = advised(&error);
+        assert!(fits[0] > 100, "{error}");
+        check("cornell", fits, &swift).unwrap_or_else(|error| panic!("what was advised: {error}"));
+    }
+
+    #[test]
+    fn a_buffer_larger_than_what_can_be_allocated_is_told() {
+        let small = device(1 << 27, 1 << 20);
+        let error = check("cornell", [640, 480], &small)
+            .expect_err("1 MiB is too little")
+            .to_string();
+        assert!(error.contains("allocates 1.0 MiB at once"), "{error}");
+        check("cornell", advised(&error), &small).unwrap_or_else(|error| panic!("what was advised: {error}"));
+    }
+
+    #[test]
+    fn no_resolution_is_advised_where_the_scene_is_too_large() {
+        let tiny = device(16, 1 << 30);
+        let error = check("cornell-spheres", [64, 64], &tiny)
+            .expect_err("16 texels")
+            .to_string();
+        assert!(!error.contains("--resolution"), "{error}");
+        assert!(error.contains("--device") && error.contains("--backend cpu"), "{error}");
+    }
+}
