@@ -6,6 +6,7 @@
 mod converge;
 mod features;
 mod gather;
+mod kernels;
 mod paper;
 mod plot;
 mod random;
@@ -16,6 +17,7 @@ mod tables;
 pub use converge::{Converge, Convergence, Curve, Measured, Reached, converge, converge_table, csv, seconds_to};
 pub use features::{AddedFeature, FeatureCosts, feature_costs, features_table};
 pub use gather::{GatherBench, MethodResult, ResolutionResult, Results, StepTimes};
+pub use kernels::{CompiledKernel, CompiledKernels, compiled_kernels, kernels_table};
 pub use plot::{plot_convergence, plot_methods, plot_scaling};
 pub use random::{Across, Battery, ChiSquare, LIMIT, battery, battery_table};
 pub use scaling::{Point, Scaling, Series, scaling};

@@ -52,6 +52,7 @@ pub fn run() -> Result<Outcome> {
         Some(Command::Bench(args::Bench::Gather(arguments))) => bench::gather(&arguments),
         Some(Command::Bench(args::Bench::Random(arguments))) => bench::random(&arguments),
         Some(Command::Bench(args::Bench::Features(arguments))) => bench::features(&arguments),
+        Some(Command::Bench(args::Bench::Kernels(arguments))) => bench::kernels(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Converge(arguments)) => converge::run(&arguments),
         Some(Command::Gathers) => print(&list::gathers()?),

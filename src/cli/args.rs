@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::bench::{BenchFeatures, BenchGather, BenchRandom};
+use super::bench::{BenchFeatures, BenchGather, BenchKernels, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
 use super::outputs::named;
@@ -70,6 +70,8 @@ pub enum Bench {
     Random(BenchRandom),
     /// What each feature costs that a scene doesn't need.
     Features(BenchFeatures),
+    /// What the driver's compiler says of each kernel: registers, spills, subgroups that fit. Nothing is run.
+    Kernels(BenchKernels),
 }
 
 /// What computes.

@@ -14,7 +14,7 @@ use crate::bench::{self, GatherBench};
 use crate::config::{EmissionChoice, Probe, RenderConfig};
 use crate::film::{write_png, write_whole};
 use crate::gather::{METHODS, method};
-use crate::scene::{PackedScene, Scene};
+use crate::scene::{PackedScene, Scene, SceneFeatures};
 
 /// What is measured where the user names no scene.
 const CORNELL: [(&str, &[u8]); 2] = [
@@ -214,6 +214,52 @@ pub fn features(arguments: &BenchFeatures) -> Result<Outcome> {
         print(&(serde_json::to_string_pretty(&costs)? + "\n"))?;
     } else {
         print(&bench::features_table(&costs))?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// `ppm-vk bench kernels`.
+#[derive(Debug, Args)]
+pub struct BenchKernels {
+    /// What is compiled in: none, all, or features by their names in `inspect`, separated by commas.
+    #[arg(long, value_name = "FEATURES", default_value = "none", value_parser = features_named)]
+    features: SceneFeatures,
+    /// Vulkan device, by a part of its name or its index [default: the best].
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+    /// As JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn features_named(text: &str) -> Result<SceneFeatures, String> {
+    match text {
+        "none" => return Ok(SceneFeatures::default()),
+        "all" => return Ok(SceneFeatures::ALL),
+        _ => (),
+    }
+    let mut known = SceneFeatures::default()
+        .constants()
+        .map(|(name, _)| (SceneFeatures::spell(name), false));
+    for name in text.split(',') {
+        match known.iter_mut().find(|(other, _)| other == name.trim()) {
+            Some((_, present)) => *present = true,
+            None => {
+                let names = known.map(|(name, _)| name);
+                return Err(format!("no feature «{name}»; there are {}", names.join(", ")));
+            }
+        }
+    }
+    Ok(SceneFeatures::of_constants(known.map(|(_, present)| present)))
+}
+
+/// Compiles the kernels, prints what the driver says.
+pub fn kernels(arguments: &BenchKernels) -> Result<Outcome> {
+    let compiled = bench::compiled_kernels(arguments.device.as_deref(), arguments.features)?;
+    if arguments.json {
+        print(&(serde_json::to_string_pretty(&compiled)? + "\n"))?;
+    } else {
+        print(&bench::kernels_table(&compiled))?;
     }
     Ok(Outcome::Done)
 }

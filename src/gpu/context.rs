@@ -284,6 +284,14 @@ impl Instance {
         }
     }
 
+    /// Whether a device's driver tells what it compiles kernels to.
+    pub fn tells_statistics(&self, device: vk::PhysicalDevice) -> Result<bool> {
+        // SAFETY: the device is one of this instance's.
+        let extensions = unsafe { self.handle.enumerate_device_extension_properties(device) }
+            .or_vulkan("vkEnumerateDeviceExtensionProperties")?;
+        Ok(has(&extensions, khr::pipeline_executable_properties::NAME))
+    }
+
     /// A queue family that computes, and its timestamps' valid bits; one without graphics where there is a choice.
     pub fn compute_family(&self, device: vk::PhysicalDevice) -> Option<(u32, u32)> {
         // SAFETY: the device belongs to this instance.
@@ -324,11 +332,14 @@ pub(super) struct Context {
     pub family: u32,
     pub timestamp_bits: u32,
     debug: Option<ext::debug_utils::Device>,
+    /// Whether kernels are only compiled. A device that isn't there can't be waited for.
+    compiles_only: bool,
     pub instance: Arc<Instance>,
 }
 
 impl Context {
-    pub fn new(instance: Arc<Instance>, physical: vk::PhysicalDevice) -> Result<Self> {
+    /// `compiles_only`: to ask what kernels are compiled to, and run none.
+    pub fn new(instance: Arc<Instance>, physical: vk::PhysicalDevice, compiles_only: bool) -> Result<Self> {
         let (family, timestamp_bits) = instance
             .compute_family(physical)
             .ok_or_else(|| Error::Device("the device has no compute queue".to_owned()))?;
@@ -347,9 +358,14 @@ impl Context {
             if has(&extensions, khr::portability_subset::NAME) {
                 names.push(khr::portability_subset::NAME.as_ptr());
             }
-            let create = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .enabled_extension_names(&names);
+            let mut of_executables =
+                vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+            let mut create = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+            if compiles_only {
+                names.push(khr::pipeline_executable_properties::NAME.as_ptr());
+                create = create.push_next(&mut of_executables);
+            }
+            let create = create.enabled_extension_names(&names);
             let device = instance
                 .handle
                 .create_device(physical, &create, None)
@@ -374,6 +390,7 @@ impl Context {
                 family,
                 timestamp_bits,
                 debug,
+                compiles_only,
                 instance,
             })
         }
@@ -421,7 +438,9 @@ impl Drop for Context {
     fn drop(&mut self) {
         // SAFETY: buffers, pipelines and pools are gone: Device drops them before the context.
         unsafe {
-            let _ = self.device.device_wait_idle();
+            if !self.compiles_only {
+                let _ = self.device.device_wait_idle();
+            }
             ManuallyDrop::drop(&mut self.allocator);
             self.device.destroy_device(None);
         }

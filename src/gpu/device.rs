@@ -61,14 +61,14 @@ impl Device {
         let devices = instance.devices()?;
         let (physical, summary) = choose(devices, choice)?;
         check_usable(&summary)?;
-        let context = Context::new(instance, physical)?;
+        let context = Context::new(instance, physical, false)?;
         let slots = Slots::new(&context)?;
         let cache = PipelineCache::open(&context, physical)?;
         let mut device = Self {
             summary,
             loop_limit: u32::MAX,
             buffers: HashMap::new(),
-            pipelines: Pipelines::new(cache),
+            pipelines: Pipelines::new(cache, vk::PipelineCreateFlags::empty()),
             descriptors: Descriptors::default(),
             slots,
             thread_ns: HashMap::new(),
@@ -191,7 +191,7 @@ fn check_usable(summary: &DeviceSummary) -> Result<()> {
     )))
 }
 
-fn choose(
+pub(super) fn choose(
     mut devices: Vec<(vk::PhysicalDevice, DeviceSummary)>,
     choice: Option<&str>,
 ) -> Result<(vk::PhysicalDevice, DeviceSummary)> {

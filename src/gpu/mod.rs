@@ -10,9 +10,11 @@ mod execute;
 mod pipeline;
 mod pipeline_cache;
 mod self_check;
+mod statistics;
 mod submission;
 
 pub use context::DeviceSummary;
 pub(crate) use device::advice;
 pub use device::{Device, best_device, devices};
 pub use execute::{Done, Ticket};
+pub use statistics::{Compiler, Statistic};

@@ -29,6 +29,7 @@ type Key = (&'static str, Vec<(u32, u32)>);
 
 pub(super) struct Pipelines {
     cache: PipelineCache,
+    flags: vk::PipelineCreateFlags,
     layouts: HashMap<&'static str, Layouts>,
     pipelines: HashMap<Key, Pipeline>,
 }
@@ -43,9 +44,10 @@ pub(super) fn descriptor_type(access: Access) -> vk::DescriptorType {
 
 impl Pipelines {
     /// None yet.
-    pub fn new(cache: PipelineCache) -> Self {
+    pub fn new(cache: PipelineCache, flags: vk::PipelineCreateFlags) -> Self {
         Self {
             cache,
+            flags,
             layouts: HashMap::new(),
             pipelines: HashMap::new(),
         }
@@ -87,6 +89,7 @@ impl Pipelines {
             .name(c"main")
             .specialization_info(&specialization);
         let create = vk::ComputePipelineCreateInfo::default()
+            .flags(self.flags)
             .stage(stage_info)
             .layout(layouts.pipeline);
         // SAFETY: module and layout are alive; the context outlives the pipeline.

@@ -50,6 +50,19 @@ impl PipelineCache {
         Ok(Self { handle, file, known })
     }
 
+    /// One that nothing is read into and that isn't kept.
+    pub fn empty(context: &Context) -> Result<Self> {
+        let create = vk::PipelineCacheCreateInfo::default();
+        // SAFETY: a plain creation call; `free` destroys what it makes.
+        let handle =
+            unsafe { context.device.create_pipeline_cache(&create, None) }.or_vulkan("vkCreatePipelineCache")?;
+        Ok(Self {
+            handle,
+            file: None,
+            known: Vec::new(),
+        })
+    }
+
     /// Writes what is new, and destroys the cache.
     pub fn free(&mut self, context: &Context) {
         // SAFETY: the caller makes no more pipelines with it.

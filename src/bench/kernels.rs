@@ -1,0 +1,108 @@
+//! What a driver's compiler makes of the kernels: registers, spills, subgroups that fit. No kernel runs.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use crate::config::RUN_ON_CPU;
+use crate::error::Result;
+use crate::gpu::{Compiler, Statistic};
+use crate::scene::SceneFeatures;
+use crate::shaders;
+use crate::stage::{Shader, StageDesc};
+
+/// Kernels compiled for one set of features.
+#[derive(Debug, Clone, Serialize)]
+pub struct CompiledKernels {
+    /// Name and driver of the device.
+    pub device: String,
+    /// What the kernels know; empty: nothing that a scene can do without.
+    pub features: Vec<String>,
+    /// In the order of their names.
+    pub kernels: Vec<CompiledKernel>,
+}
+
+/// A kernel, and what the compiler says of it.
+#[derive(Debug, Clone, Serialize)]
+pub struct CompiledKernel {
+    /// Its stage.
+    pub stage: &'static str,
+    /// The driver's figures by its names, in its order.
+    pub statistics: Vec<(String, f64)>,
+}
+
+impl CompiledKernel {
+    /// A figure by the driver's name.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        let found = self.statistics.iter().find(|(other, _)| other == name);
+        found.map(|(_, value)| *value)
+    }
+}
+
+/// Compiles every kernel as a scene with these features needs it: photon paths aimed, a pixel's paths found anew in each iteration.
+///
+/// # Errors
+/// A device that isn't there, or whose driver doesn't tell what it compiles to.
+pub fn compiled_kernels(device: Option<&str>, features: SceneFeatures) -> Result<CompiledKernels> {
+    let mut compiler = Compiler::open(device)?;
+    let is_processor = compiler.summary().kind == "cpu";
+    let mut constants = vec![
+        ("AIMED", 1),
+        ("ASKS_BEHIND_GLASS", 0),
+        ("RUN", if is_processor { RUN_ON_CPU } else { 1 }),
+    ];
+    constants.extend(features.constants().map(|(name, present)| (name, u32::from(present))));
+    let mut compile = |shader: &&'static Shader| {
+        let stage = StageDesc::new(shader, 1).constants(constants.clone());
+        let statistics = compiler.statistics(&stage)?;
+        Ok(CompiledKernel {
+            stage: shader.name,
+            statistics: statistics
+                .into_iter()
+                .map(|Statistic { name, value }| (name, value))
+                .collect(),
+        })
+    };
+    let kernels = shaders::ALL.iter().map(&mut compile).collect::<Result<_>>()?;
+    let summary = compiler.summary();
+    Ok(CompiledKernels {
+        device: format!("{} ({})", summary.name, summary.driver),
+        features: features.names(),
+        kernels,
+    })
+}
+
+/// The figures as a table, a column for each that differs among the kernels, but for hashes.
+pub fn kernels_table(compiled: &CompiledKernels) -> String {
+    let features = if compiled.features.is_empty() {
+        "none".to_owned()
+    } else {
+        compiled.features.join(", ")
+    };
+    let mut text = format!(
+        "on {}\nfeatures compiled in: {features}\n\n{:<22}",
+        compiled.device, "kernel"
+    );
+    let mut names: Vec<&str> = Vec::new();
+    for (name, _) in compiled.kernels.iter().flat_map(|kernel| &kernel.statistics) {
+        let values = || compiled.kernels.iter().map(|kernel| kernel.get(name));
+        let is_hash = name.to_lowercase().contains("hash");
+        if !is_hash && !names.contains(&name.as_str()) && values().any(|value| Some(value) != values().next()) {
+            names.push(name);
+        }
+    }
+    for name in &names {
+        // Writing to a String can't fail.
+        let _ = write!(text, " {name:>width$}", width = name.len().max(8));
+    }
+    text.push('\n');
+    for kernel in &compiled.kernels {
+        let _ = write!(text, "{:<22}", kernel.stage);
+        for name in &names {
+            let value = kernel.get(name).map_or("-".to_owned(), |value| format!("{value}"));
+            let _ = write!(text, " {value:>width$}", width = name.len().max(8));
+        }
+        text.push('\n');
+    }
+    text
+}

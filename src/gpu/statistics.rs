@@ -1,0 +1,97 @@
+//! What a driver's compiler says of kernels: registers, spills, how many subgroups fit. Needs VK_KHR_pipeline_executable_properties.
+//! RADV compiles for a card that isn't there (RADV_FORCE_FAMILY), so nothing is run here.
+
+use ash::{khr, vk};
+
+use super::context::{Context, DeviceSummary, Instance, OrVulkan};
+use super::device::choose;
+use super::pipeline::Pipelines;
+use super::pipeline_cache::PipelineCache;
+use crate::error::{Error, Result};
+use crate::stage::StageDesc;
+
+/// A figure of the compiler's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Statistic {
+    /// As the driver names it.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+}
+
+/// A device that compiles kernels and runs none.
+pub struct Compiler {
+    summary: DeviceSummary,
+    pipelines: Pipelines,
+    properties: khr::pipeline_executable_properties::Device,
+    context: Context,
+}
+
+impl Compiler {
+    /// Opens the device that `choice` names or numbers, or the best.
+    ///
+    /// # Errors
+    /// No such device, or a driver that says nothing of what it compiles.
+    pub fn open(choice: Option<&str>) -> Result<Self> {
+        let instance = Instance::shared()?;
+        let (physical, summary) = choose(instance.devices()?, choice)?;
+        if !instance.tells_statistics(physical)? {
+            return Err(Error::Device(format!(
+                "device {} ({}) doesn't tell what it compiles kernels to (VK_KHR_pipeline_executable_properties); pick another with \
+                 --device",
+                summary.index, summary.name
+            )));
+        }
+        let context = Context::new(instance, physical, true)?;
+        let properties = khr::pipeline_executable_properties::Device::new(&context.instance.handle, &context.device);
+        Ok(Self {
+            summary,
+            pipelines: Pipelines::new(
+                PipelineCache::empty(&context)?,
+                vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR,
+            ),
+            properties,
+            context,
+        })
+    }
+
+    /// Name, driver, limits.
+    pub fn summary(&self) -> &DeviceSummary {
+        &self.summary
+    }
+
+    /// What the compiler says of a stage's kernel, in its order.
+    ///
+    /// # Errors
+    /// A kernel that doesn't compile.
+    pub fn statistics(&mut self, stage: &StageDesc) -> Result<Vec<Statistic>> {
+        let pipeline = self.pipelines.get(&self.context, stage)?;
+        let executable = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline.handle);
+        // SAFETY: the pipeline is alive, and was created to be asked for its statistics.
+        let found = unsafe { self.properties.get_pipeline_executable_statistics(&executable) }
+            .or_vulkan("vkGetPipelineExecutableStatisticsKHR")?;
+        let statistic = |found: &vk::PipelineExecutableStatisticKHR<'_>| {
+            // SAFETY: the format says which member of the union the driver has written.
+            let value = unsafe {
+                match found.format {
+                    vk::PipelineExecutableStatisticFormatKHR::BOOL32 => f64::from(found.value.b32),
+                    vk::PipelineExecutableStatisticFormatKHR::INT64 => found.value.i64 as f64,
+                    vk::PipelineExecutableStatisticFormatKHR::FLOAT64 => found.value.f64,
+                    _ => found.value.u64 as f64,
+                }
+            };
+            let name = found.name_as_c_str().unwrap_or_default().to_string_lossy();
+            Statistic {
+                name: name.into_owned(),
+                value,
+            }
+        };
+        Ok(found.iter().map(statistic).collect())
+    }
+}
+
+impl Drop for Compiler {
+    fn drop(&mut self) {
+        self.pipelines.free(&self.context);
+    }
+}
