@@ -51,7 +51,7 @@ fn vulkan_and_unsafe_live_in_gpu_alone() {
 fn imports_go_downward() {
     // Who must not know whom.
     let forbidden: &[(&str, &[&str])] = &[
-        ("layout.rs", &["crate::"]),
+        ("layout", &["crate::"]),
         (
             "stage.rs",
             &[

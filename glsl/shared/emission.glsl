@@ -35,7 +35,7 @@ vec3 direction_off(vec3 axis, float versine, float turn) {
 
 // 1 − cos of a photon's angle from a spot's axis, such that all photons have the same flux, and the solid angle that would
 // have the whole intensity: the integral of the squared ramp is a third of its width.
-float spot_versine(PunctualLight light, float u, out float solid_angle) {
+float spot_versine(Light light, float u, out float solid_angle) {
     float ramp = light.outer - light.inner;
     float whole = light.inner + ramp / 3.0;
     solid_angle = 2.0 * PI * whole;
@@ -55,17 +55,18 @@ AimedStart emit_from_afar(vec3 towards, vec3 irradiance, float area, vec2 place,
     return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0, 0u), passed, true, true);
 }
 
-AimedStart emit_directional(PunctualLight light, float area, vec2 place, vec2 turn, Target target) {
+AimedStart emit_directional(Light light, vec2 place, vec2 turn, Target target) {
     if (SOFT_LIGHTS && light.extent > 0.0) {
         vec3 towards = direction_in_cone(-light.direction, light.extent, turn);
-        return emit_from_afar(towards, light.intensity, area, place, target);
+        return emit_from_afar(towards, light.intensity, light.area, place, target);
     }
     // A disc across the rays that covers the target, or the scene.
     vec3 centre = target.everything ? light.position : target.sphere.xyz;
-    float radius = target.everything ? sqrt(area / PI) : target.sphere.w;
+    float radius = target.everything ? sqrt(light.area / PI) : target.sphere.w;
     vec3 passed = centre + basis(light.direction) * vec3(radius * disc_point(place), 0.0);
     // From a plane before the scene.
     vec3 origin = passed;
+    float area = light.area;
     if (!target.everything) {
         area = PI * radius * radius;
         origin -= light.direction * dot(passed - light.position, light.direction);
@@ -79,11 +80,11 @@ AimedStart emit_environment(float area, vec2 place, vec2 direction, Target targe
     return emit_from_afar(towards, sky.radiance / sky.density, area, place, target);
 }
 
-AimedStart emit_point(PunctualLight light, uint kind, vec2 place, vec2 u, Target target) {
+AimedStart emit_point(Light light, vec2 place, vec2 u, Target target) {
     Cone cone = Cone(vec3(0.0, 0.0, 1.0), 2.0);
     if (!target.everything) {
         // Rays from anywhere on the light's disc.
-        cone = cone_of(target.sphere + vec4(vec3(0.0), light.extent), light.position);
+        cone = cone_of(target.sphere + vec4(vec3(0.0), SOFT_LIGHTS ? light.extent : 0.0), light.position);
     }
     float solid_angle = 2.0 * PI * cone.versine;
     vec3 intensity = light.intensity;
@@ -91,10 +92,10 @@ AimedStart emit_point(PunctualLight light, uint kind, vec2 place, vec2 u, Target
     bool on_target = true;
     float spot_solid_angle = 0.0;
     float versine = 0.0;
-    if (kind == SPOT_LIGHT) {
+    if (light.kind == SPOT_LIGHT) {
         versine = spot_versine(light, u.x, spot_solid_angle);
     }
-    if (kind == SPOT_LIGHT && (target.everything || solid_angle >= spot_solid_angle)) {
+    if (light.kind == SPOT_LIGHT && (target.everything || solid_angle >= spot_solid_angle)) {
         solid_angle = spot_solid_angle;
         direction = direction_off(light.direction, versine, u.y);
         on_target = false;
@@ -102,7 +103,7 @@ AimedStart emit_point(PunctualLight light, uint kind, vec2 place, vec2 u, Target
         direction = direction_off(cone.axis, 2.0 * u.x, u.y);
     } else {
         direction = direction_in_cone(cone.axis, cone.versine, u);
-        if (kind == SPOT_LIGHT) {
+        if (light.kind == SPOT_LIGHT) {
             vec3 off_axis = direction - light.direction;
             intensity *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
         }
@@ -151,11 +152,10 @@ AimedStart emit_triangle(uint index, Light light, vec2 place, vec2 u, float side
 AimedStart emit_from(uint index, vec2 place, vec2 direction, float side, Target target) {
     Light light = light_at(index);
     if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
-        PunctualLight punctual = punctual_light_at(index);
         if (light.kind == DIRECTIONAL_LIGHT) {
-            return emit_directional(punctual, light.area, place, direction, target);
+            return emit_directional(light, place, direction, target);
         }
-        return emit_point(punctual, light.kind, place, direction, target);
+        return emit_point(light, place, direction, target);
     }
     if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
         return emit_environment(light.area, place, direction, target);

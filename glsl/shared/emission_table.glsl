@@ -3,8 +3,6 @@
 
 uniform usamplerBuffer EmissionTable;
 
-const uint CELL_TEXELS = 4u;
-
 struct EmissionTableSize {
     uint cells;
     uint targets;
@@ -19,6 +17,10 @@ EmissionTableSize emission_table_size() {
 // xyz: centre; w: radius.
 vec4 target_sphere(uint i) {
     return TEXEL(EmissionTable, 1u + i);
+}
+
+EmissionCell emission_cell(EmissionTableSize size, uint i) {
+    return EMISSION_CELL_AFTER(EmissionTable, 1u + size.targets, i);
 }
 
 // What a path starts with: five coordinates in [0, 1), of which the last has chosen the light.
@@ -38,17 +40,13 @@ vec4 in_box(vec4 low, vec4 size, vec4 u) {
 
 Start choose_start(EmissionTableSize size, vec4 u, vec4 w) {
     AliasPlace place = alias_place(size.cells, u.x, w.xz);
-    uint cells = 1u + size.targets;
-    float accept = TEXEL(EmissionTable, cells + CELL_TEXELS * place.cell + 2u).w;
-    uint alias = TEXEL_BITS(EmissionTable, cells + CELL_TEXELS * place.cell + 3u).x;
-    Choice choice = alias_choice(place, accept, alias);
-    uint cell = cells + CELL_TEXELS * choice.index;
-    vec4 coordinates = in_box(TEXEL(EmissionTable, cell), TEXEL(EmissionTable, cell + 1u), vec4(choice.rest, u.yzw));
-    vec4 light_weight = TEXEL(EmissionTable, cell + 2u);
-    uvec4 rest = TEXEL_BITS(EmissionTable, cell + 3u);
-    float e = in_box(light_weight.xxxx, light_weight.yyyy, w.wwww).x;
-    LightWithin within = light_within(rest.y, rest.z, e);
-    return Start(within.light, within.probability, coordinates.xy, coordinates.zw, rest.w, light_weight.z);
+    EmissionCell entry = emission_cell(size, place.cell);
+    Choice choice = alias_choice(place, entry.accept, entry.alias);
+    EmissionCell cell = emission_cell(size, choice.index);
+    vec4 coordinates = in_box(cell.low, cell.size, vec4(choice.rest, u.yzw));
+    float e = in_box(vec4(cell.low_light), vec4(cell.size_light), w.wwww).x;
+    LightWithin within = light_within(cell.first_light, cell.lights, e);
+    return Start(within.light, within.probability, coordinates.xy, coordinates.zw, cell.target, cell.weight);
 }
 
 // Whether a ray meets a sphere. One that comes from afar has no beginning.

@@ -42,7 +42,7 @@ Receiver receiver_at(uint slot, uint map) {
     receiver.object |= receiver.object != NO_OBJECT && map == 1u ? CAUSTIC : 0u;
     receiver.normal = decode_octahedral(floatBitsToUint(weight_normal.w));
     if (GLOSSY) {
-        Gloss gloss = GLOSS(slot);
+        Gloss gloss = GLOSS(GlossOf, slot);
         receiver.shading_normal = decode_direction(floatBitsToUint(TEXEL(VisiblePoints, 3u * slot + 2u).w));
         receiver.viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
         receiver.reflector = reflector_of(gloss);

@@ -61,9 +61,8 @@ LightRay glint(uint index, vec2 place, Encounter met, Material material, Reflect
     if (!is_punctual(light.kind)) {
         return NO_LIGHT_RAY;
     }
-    PunctualLight lamp = punctual_light_at(index);
-    vec3 origin = origin_towards(met.surface, arriving_from(lamp, light.kind, met.surface.position, place).ray);
-    Arriving arriving = arriving_from(lamp, light.kind, origin, place);
+    vec3 origin = origin_towards(met.surface, arriving_from(light, met.surface.position, place).ray);
+    Arriving arriving = arriving_from(light, origin, place);
     vec3 l = normalize(arriving.ray);
     float nl = dot(l, met.facing.shading_normal);
     bool same_side = dot(l, met.facing.geometric_normal) > 0.0;
@@ -117,12 +116,11 @@ vec3 soft_lights_along(vec3 origin, vec3 direction, float end, uint medium) {
     vec3 sum = vec3(0.0);
     for (uint i = settings.light_count; i > 0u && light_at(i - 1u).kind != TRIANGLE_LIGHT; i--) {
         loop_count += 1u;
-        uint kind = light_at(i - 1u).kind;
-        PunctualLight light = punctual_light_at(i - 1u);
-        if (!is_punctual(kind) || light.extent <= 0.0) {
+        Light light = light_at(i - 1u);
+        if (!is_punctual(light.kind) || light.extent <= 0.0) {
             continue;
         }
-        bool distant = kind == DIRECTIONAL_LIGHT;
+        bool distant = light.kind == DIRECTIONAL_LIGHT;
         vec3 to_middle = light.position - origin;
         float way = distant ? 1e30 : dot(to_middle, direction);
         vec3 off_axis = distant ? direction + light.direction : to_middle - way * direction;
@@ -135,7 +133,7 @@ vec3 soft_lights_along(vec3 origin, vec3 direction, float end, uint medium) {
             if (!distant) {
                 radiance *= range_window(light.inverse_range, way);
             }
-            if (kind == SPOT_LIGHT) {
+            if (light.kind == SPOT_LIGHT) {
                 vec3 off_spot = direction + light.direction;
                 radiance *= spot_falloff(light, 0.5 * dot(off_spot, off_spot));
             }

@@ -6,8 +6,6 @@ layout(constant_id = 9) const bool GLOSSY = false; // the scene has glossy surfa
 
 // Below this α a boundary is a mirror.
 const float SMOOTH_ALPHA = 1e-3;
-// Below this α camera paths follow reflections; photons gathered on such a narrow lobe would be noise.
-const float FOLLOWED_ALPHA = 0.1;
 
 struct Reflector {
     vec3 diffuse;   // albedo of the base
@@ -19,14 +17,6 @@ struct Reflector {
 };
 
 const Reflector NO_REFLECTOR = Reflector(vec3(0.0), vec3(0.0), 0.0, 0.0, vec2(0.0), 0.0);
-
-// How a visible point's surface scatters.
-struct Gloss {
-    vec4 diffuse_viewer; // w: uint bits, octahedral v
-    uvec4 rest;          // f16s: f0, f90, α, coat, over_base; α = 0 where the path followed the reflection itself
-};
-
-#define GLOSS(i) Gloss(TEXEL(GlossOf, 2u * (i)), TEXEL_BITS(GlossOf, 2u * (i) + 1u))
 
 Reflector reflector_of(Gloss gloss) {
     vec2 f0_b_f90 = unpackHalf2x16(gloss.rest.y);

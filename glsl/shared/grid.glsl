@@ -5,13 +5,6 @@
 // Radii grow with the distance from the camera, as footprints do. So space is divided into shells around it, each four times
 // as large as the one within, and each shell of each photon map has a grid of its own cell size. Include after settings.glsl.
 
-const uint SHELLS = 8u;
-
-// Set on the device for each iteration, from the radii that the visible points have then.
-struct GridShape {
-    float inverse_cell_size[2u * SHELLS]; // of each photon map's shells
-};
-
 // The shell at a squared distance from the camera. Render space is 2 long: what is farther away than 4 is in the outermost.
 uint shell_at(float distance2) {
     int exponent = int(floatBitsToUint(distance2) >> 23u) - 127;

@@ -191,9 +191,6 @@ float enter_box(vec3 box_min, vec3 box_max, LocalRay ray, float limit) {
 
 // No hierarchy is deeper than 64. One entry more, since compilers that turn arrays of up to 256 bytes into registers spill here.
 const uint STACK_SIZE = 65u;
-const uint LEAF = 0x80000000u; // of a reference to a leaf's first record, see layout::BvhRecord
-const uint PLACEMENT_RECORD = 1u; // kinds of a leaf's records, triangles' but not
-const uint RAY_RECORD = 2u;
 
 const float TIE = 16.0 / 16777216.0; // of a distance, that rounding may change
 

@@ -4,51 +4,11 @@
 
 layout(constant_id = 31) const bool PARTED_LIGHTS = false; // triangles whose parts are lights
 
-const uint TRIANGLE_LIGHT = 0u;
-const uint POINT_LIGHT = 1u;
-const uint SPOT_LIGHT = 2u;
-const uint DIRECTIONAL_LIGHT = 3u;
-const uint ENVIRONMENT_LIGHT = 4u;
-
-// Mirrors the first texel of `layout::Light`: all there is of a triangle.
-struct Light {
-    uint triangle;
-    float probability; // nearly in proportion to its flux
-    float area;        // of the triangle or its part, or of the disc that a distant light's photons start from; render units²
-    uint kind;
-};
-
-// The rest of `layout::Light`, without the table's cell and the light's place within its source.
-struct PunctualLight {
-    vec3 intensity;      // point, spot: along the axis. Directional: irradiance across the rays
-    vec3 position;       // directional: centre of the disc
-    vec3 direction;      // that it shines along
-    float inner;         // spot: 1 − cos of the angle where it begins to fall off
-    float outer;         // spot: 1 − cos of the angle where it ends
-    float inverse_range; // point, spot: 0 where it has no range
-    float extent;        // of some: a disc's radius; directional: 1 − cos of the angle between its middle and its edge
-};
-
 uniform usamplerBuffer Lights;
 uniform usamplerBuffer MediaOfLights;
 
-const uint LIGHT_TEXELS = 5u;
-
 Light light_at(uint i) {
-    uvec4 bits = TEXEL_BITS(Lights, LIGHT_TEXELS * i);
-    return Light(bits.x, uintBitsToFloat(bits.y), uintBitsToFloat(bits.z), bits.w);
-}
-
-PunctualLight punctual_light_at(uint i) {
-    vec4 intensity_inner = TEXEL(Lights, LIGHT_TEXELS * i + 2u);
-    vec4 position_outer = TEXEL(Lights, LIGHT_TEXELS * i + 3u);
-    vec4 direction_range = TEXEL(Lights, LIGHT_TEXELS * i + 4u);
-    float extent = 0.0;
-    if (SOFT_LIGHTS) {
-        extent = TEXEL(Lights, LIGHT_TEXELS * i + 1u).w;
-    }
-    return PunctualLight(intensity_inner.rgb, position_outer.xyz, direction_range.xyz, intensity_inner.w,
-                         position_outer.w, direction_range.w, extent);
+    return LIGHT(Lights, i);
 }
 
 // That a light is in.
@@ -63,7 +23,7 @@ Media media_of_light(uint light) {
 
 // Which part of its triangle a light is: column, row, and how many columns there are. See scene::part.
 vec3 part_of(uint light) {
-    return TEXEL(Lights, LIGHT_TEXELS * light + 3u).xyz;
+    return light_at(light).position;
 }
 
 // Barycentric coordinates of a point of a triangle's light.
@@ -98,7 +58,7 @@ bool is_punctual(uint kind) {
 }
 
 float cumulative_probability(uint light) {
-    return uintBitsToFloat(TEXEL_BITS(Lights, LIGHT_TEXELS * light + 1u).z);
+    return light_at(light).cumulative;
 }
 
 struct LightWithin {
@@ -134,8 +94,8 @@ float probability_within(uint light) {
 
 Choice choose_light(float u, vec2 digits) {
     AliasPlace place = alias_place(settings.light_count, u, digits);
-    vec4 entry = TEXEL(Lights, LIGHT_TEXELS * place.cell + 1u);
-    return alias_choice(place, entry.x, floatBitsToUint(entry.y));
+    Light entry = light_at(place.cell);
+    return alias_choice(place, entry.accept, entry.alias);
 }
 
 // Whether light leaves on the triangle's front, or on its back.
@@ -154,7 +114,7 @@ vec3 emitted_radiance(Material material, float cosine) {
 
 // How much of its intensity a spot has at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as
 // KHR_lights_punctual recommends.
-float spot_falloff(PunctualLight light, float versine) {
+float spot_falloff(Light light, float versine) {
     float ramp = clamp((light.outer - versine) / (light.outer - light.inner), 0.0, 1.0);
     return ramp * ramp;
 }
@@ -173,9 +133,9 @@ struct Arriving {
     vec3 irradiance; // across the ray
 };
 
-Arriving arriving_from(PunctualLight light, uint kind, vec3 point, vec2 u) {
+Arriving arriving_from(Light light, vec3 point, vec2 u) {
     Arriving arriving;
-    if (kind == DIRECTIONAL_LIGHT) {
+    if (light.kind == DIRECTIONAL_LIGHT) {
         arriving = Arriving(-light.direction, 1e30, light.intensity);
         if (SOFT_LIGHTS && light.extent > 0.0) {
             arriving.ray = direction_in_cone(arriving.ray, light.extent, u);
@@ -196,7 +156,7 @@ Arriving arriving_from(PunctualLight light, uint kind, vec3 point, vec2 u) {
             area_over_angle = radius2 / (2.0 * versine);
         }
         vec3 irradiance = light.intensity * (range_window(light.inverse_range, sqrt(distance2)) / area_over_angle);
-        if (kind == SPOT_LIGHT) {
+        if (light.kind == SPOT_LIGHT) {
             vec3 off_axis = ray * inversesqrt(distance2) + light.direction;
             irradiance *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
         }

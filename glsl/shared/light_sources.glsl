@@ -6,31 +6,12 @@ layout(constant_id = 29) const bool MANY_SOURCES = false;
 
 uniform usamplerBuffer LightSources;
 
-// Mirrors `layout::LightSource`.
-struct LightSource {
-    vec3 centre;
-    float radius;
-    vec3 axis; // that it shines along
-    float cos_cone; // how far its lights' axes lean from that
-    float strength; // triangles, points: intensity. Others: irradiance
-    float inverse_range;
-    uint kind;
-    uint first_light;
-    uint light_count;
-    float probability; // without knowing the point
-};
-
 // The part of all choices among those that can bring anything that is made without knowing the point: what is before a bright
 // one isn't known.
 const float WITHOUT_POINT = 0.1;
 
 LightSource light_source_at(uint i) {
-    vec4 sphere = TEXEL(LightSources, 4u * i);
-    vec4 cone = TEXEL(LightSources, 4u * i + 1u);
-    uvec4 rest = TEXEL_BITS(LightSources, 4u * i + 2u);
-    uvec4 last = TEXEL_BITS(LightSources, 4u * i + 3u);
-    return LightSource(sphere.xyz, sphere.w, cone.xyz, cone.w, uintBitsToFloat(rest.x), uintBitsToFloat(rest.y), rest.z,
-                       rest.w, last.x, uintBitsToFloat(last.y));
+    return LIGHT_SOURCE(LightSources, i);
 }
 
 // Cosine of the difference of two angles, or 1 where the first is the smaller one.

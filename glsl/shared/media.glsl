@@ -52,7 +52,7 @@ Media with(Media media, uint medium) {
 }
 
 float ior_of_medium(uint medium) {
-    return medium == VACUUM ? 1.0 : TEXEL(Materials, MATERIAL_TEXELS * material_of_medium(medium) + 1u).w;
+    return medium == VACUUM ? 1.0 : material_at(material_of_medium(medium)).ior;
 }
 
 // What a ray leaves at the back of a face that bounds this medium. If it isn't in that, the face is a wall that is an object of
@@ -80,7 +80,7 @@ vec3 transmittance(uint medium, float distance) {
     bool absorbs = ABSORPTION && medium != VACUUM;
     vec3 absorption = vec3(0.0);
     if (absorbs) {
-        absorption = TEXEL(Materials, MATERIAL_TEXELS * material_of_medium(medium) + 4u).rgb;
+        absorption = material_at(material_of_medium(medium)).absorption;
     }
     return exp(-absorption * distance);
 }

@@ -1,18 +1,9 @@
 // A grid of cubes for each object: its bounding box, the longest axis split into a fixed number of pieces. The scene's.
 // Include after texel.glsl.
-struct ObjectGrid {
-    vec3 low;           // the box's corner, render space
-    float inverse_cell; // 1 / side of a cube
-    uvec3 cells;        // cubes along each axis
-    uint first_cell;    // cubes of the objects before
-};
-
 uniform usamplerBuffer ObjectGrids;
 
 ObjectGrid object_grid(uint object) {
-    vec4 box = TEXEL(ObjectGrids, 2u * object);
-    uvec4 cells = TEXEL_BITS(ObjectGrids, 2u * object + 1u);
-    return ObjectGrid(box.xyz, box.w, cells.xyz, cells.w);
+    return OBJECT_GRID(ObjectGrids, object);
 }
 
 // Positions past the box, by rounding or because a radius reaches there, belong to the cells next to it.

@@ -8,13 +8,6 @@ layout(push_constant) uniform Push {
     uint path_count;
 } push;
 
-// Mirrors `layout::PathStart`.
-struct PathStart {
-    vec4 origin_triangle;    // w: uint bits, the triangle that it leaves
-    vec4 direction_range;    // w: 1 over the range of a punctual light, 0 where it reaches any distance
-    vec4 flux_light;         // rgb: flux, 0 of a path that isn't to be traced; w: uint bits, the light
-};
-
 // Quadruples of its numbers that choose a path's start.
 const uint START_NUMBERS = 2u;
 

@@ -24,54 +24,13 @@ layout(constant_id = 27) const bool NESTED = false;
 
 const uint MISS = 0xffffffffu;
 
-const uint NO_LIGHT = 0xffffffffu;
-
 const uint NO_INSTANCE = 0xffffffffu;
 
-// Flags of a triangle.
-const uint SMOOTH_SHADED = 1u; // the shading normals differ from the geometric one
-const uint TOUCHED = 2u;       // a dielectric's, and it may lie on another face
-const uint COINCIDENT = 16u;   // no dielectric's, and it lies on a face of another object that looks or shines to the same side
-const uint BACKED = 32u;       // no dielectric's, and its back lies on the back of another object's face
-const uint RANK = 16u;         // from this bit on: of dielectrics that overlap, the lowest is there
-const uint RANK_BELOW = 0xffffu;
-
-const uint MIRRORED = 1u; // of an instance's flags, which have a rank as well
-
-const uint BACK_EMITS = 1u;
-const uint BACK_HIDDEN = 2u;
-const uint SPECULAR_CHANGED = 4u;
+const uint RANK_BELOW = 0xffffu; // bits of flags below RANK
 
 const uint MIRROR = 1u;
 const uint DIELECTRIC = 2u;
 const uint GLOSSY_SURFACE = 3u;
-
-// Havel and Herout's precomputed triangle.
-struct HavelTriangle {
-    vec4 n0; // xyz: normal, w: its plane's offset
-    vec4 n1;
-    vec4 n2;
-};
-
-// A triangle as shading needs it. In each w: the vertex's shading normal, octahedral.
-struct ShadingTriangle {
-    vec4 p0;
-    vec4 p1;
-    vec4 p2;
-    uint object;
-    uint material;
-    uint flags; // SMOOTH_SHADED, TOUCHED, COINCIDENT, BACKED, and a rank
-    uint light; // NO_LIGHT where it doesn't emit
-};
-
-// Where shared triangles are put.
-struct Instance {
-    mat3x4 rows;         // of the map to render space
-    uint object;
-    uint flags; // MIRRORED, and a rank
-    uint first_triangle;
-    uint triangle_count;
-};
 
 // A triangle, and the instance that puts it where it is.
 struct PlacedTriangle {
@@ -81,45 +40,6 @@ struct PlacedTriangle {
 
 const PlacedTriangle NO_TRIANGLE = PlacedTriangle(MISS, NO_INSTANCE);
 
-struct Material {
-    vec3 base_color;
-    uint surface;      // MIRROR, DIELECTRIC, GLOSSY_SURFACE or 0 for matte
-    vec3 emission;     // radiance
-    float ior;
-    uint flags;        // BACK_EMITS, BACK_HIDDEN, SPECULAR_CHANGED
-    float metallic;
-    float roughness;
-    float transmission; // share of a dielectric's part that is no metal that passes light; the rest is glossy
-    vec3 specular_f0;   // of a glossy surface's dielectric part, or of glass
-    float specular_f90;
-    vec3 absorption;    // inside of a dielectric, 1/length
-    uint thin;          // a dielectric without an inside
-    // For texture.glsl, which reads them by itself.
-    uint color_texture;
-    uint metal_texture;
-    uint normal_texture;
-    uint emission_texture;
-    uint transmission_texture;
-    uint specular_texture;
-    uint specular_color_texture;
-    float normal_scale;
-    uint alpha_mode;
-    float alpha_cutoff;
-    float alpha;
-    float dispersion; // 20 over the Abbe number
-    float coat;       // how much of it there is
-    float coat_roughness;
-    // As the textures above.
-    uint coat_texture;
-    uint coat_roughness_texture;
-    uint coat_normal_texture;
-    float coat_normal_scale;
-    uint padding0;
-    uint padding1;
-};
-
-const uint MATERIAL_TEXELS = 10u;
-
 uniform usamplerBuffer Bvh;
 uniform usamplerBuffer HavelTriangles;
 uniform usamplerBuffer ShadingTriangles;
@@ -127,20 +47,15 @@ uniform usamplerBuffer Instances;
 uniform usamplerBuffer Materials;
 
 HavelTriangle havel_triangle(uint i) {
-    return HavelTriangle(TEXEL(HavelTriangles, 3u * i), TEXEL(HavelTriangles, 3u * i + 1u),
-                         TEXEL(HavelTriangles, 3u * i + 2u));
+    return HAVEL_TRIANGLE(HavelTriangles, i);
 }
 
 ShadingTriangle shading_triangle(uint i) {
-    uvec4 rest = TEXEL_BITS(ShadingTriangles, 4u * i + 3u);
-    return ShadingTriangle(TEXEL(ShadingTriangles, 4u * i), TEXEL(ShadingTriangles, 4u * i + 1u),
-                           TEXEL(ShadingTriangles, 4u * i + 2u), rest.x, rest.y, rest.z, rest.w);
+    return SHADING_TRIANGLE(ShadingTriangles, i);
 }
 
 Instance instance_at(uint i) {
-    uvec4 rest = TEXEL_BITS(Instances, 4u * i + 3u);
-    return Instance(mat3x4(TEXEL(Instances, 4u * i), TEXEL(Instances, 4u * i + 1u), TEXEL(Instances, 4u * i + 2u)), rest.x,
-                    rest.y, rest.z, rest.w);
+    return INSTANCE(Instances, i);
 }
 
 // Whether fronts become backs.
@@ -161,32 +76,7 @@ bool is_placed(uint instance) {
 }
 
 Material material_at(uint i) {
-    vec4 color = TEXEL(Materials, MATERIAL_TEXELS * i);
-    vec4 emission = TEXEL(Materials, MATERIAL_TEXELS * i + 1u);
-    uvec4 rest = TEXEL_BITS(Materials, MATERIAL_TEXELS * i + 2u);
-    vec4 specular = vec4(0.0);
-    uvec4 inside = uvec4(0u);
-    if (GLOSSY) {
-        specular = TEXEL(Materials, MATERIAL_TEXELS * i + 3u);
-    }
-    if (SPECULAR_GLASS) {
-        specular = TEXEL(Materials, MATERIAL_TEXELS * i + 3u);
-    }
-    if (DIELECTRICS) {
-        inside = TEXEL_BITS(Materials, MATERIAL_TEXELS * i + 4u);
-    }
-    float dispersion = 0.0;
-    if (DISPERSION) {
-        dispersion = TEXEL(Materials, MATERIAL_TEXELS * i + 7u).w;
-    }
-    vec2 coat = vec2(0.0);
-    if (CLEARCOAT) {
-        coat = TEXEL(Materials, MATERIAL_TEXELS * i + 8u).xy;
-    }
-    return Material(color.rgb, floatBitsToUint(color.w), emission.rgb, emission.w, rest.x, uintBitsToFloat(rest.y),
-                    uintBitsToFloat(rest.z), uintBitsToFloat(rest.w), specular.rgb, specular.w,
-                    uintBitsToFloat(inside.xyz), inside.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0u, 0.0, 0.0, dispersion,
-                    coat.x, coat.y, 0u, 0u, 0u, 0.0, 0u, 0u);
+    return MATERIAL(Materials, i);
 }
 
 bool is_mirror(Material material) {
@@ -226,11 +116,7 @@ bool is_coated(Material material) {
 
 // Whether a material has a coat anywhere: photons on it have their flux across their rays.
 bool has_coat(uint material) {
-    bool has = false;
-    if (CLEARCOAT) {
-        has = TEXEL(Materials, MATERIAL_TEXELS * material + 8u).x > 0.0;
-    }
-    return has;
+    return is_coated(material_at(material));
 }
 
 bool is_glossy(Material material) {

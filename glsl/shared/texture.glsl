@@ -1,37 +1,5 @@
 // What a surface's material is at a place: textures and the corners' colours. Include after scene.glsl.
 
-const uint TEXTURED_TRIANGLE = 4u; // of a triangle's flags, as the next
-const uint SEE_THROUGH = 8u;
-const uint NO_TEXTURE = 0xffffffffu;
-const uint MASK = 1u; // alpha modes; any other but 0 is a blend
-
-const uint SECOND_SET = 1u; // flags of a texture
-const uint SRGB = 2u;
-const uint NEAREST = 4u;
-const uint WRAP_U = 4u;
-const uint WRAP_V = 6u;
-const uint CLAMP = 1u;
-const uint MIRROR_REPEAT = 2u;
-
-struct Corner {
-    vec2 first;  // coordinates of the first set
-    vec2 second; // of the second set
-    uvec2 color; // f16s
-    uint tangent;
-    float bitangent;
-};
-
-struct TextureLookup {
-    vec3 row_u;
-    uint first_texel;
-    vec3 row_v;
-    uint size;
-    uint flags;
-    uint padding0;
-    uint padding1;
-    uint padding2;
-};
-
 uniform usamplerBuffer Corners;
 uniform usamplerBuffer Textures;
 uniform usamplerBuffer Texels;
@@ -43,12 +11,6 @@ struct Place {
     vec4 tangent; // w: the bitangent's side, 0 where there is none
 };
 
-Corner corner_at(uint i) {
-    vec4 sets = TEXEL(Corners, 2u * i);
-    uvec4 rest = TEXEL_BITS(Corners, 2u * i + 1u);
-    return Corner(sets.xy, sets.zw, rest.xy, rest.z, uintBitsToFloat(rest.w));
-}
-
 Place place_at(PlacedTriangle at, vec2 uv) {
     Place place = Place(vec4(0.0), vec4(0.0), vec4(0.0));
     bool is_placed = is_placed(at.instance);
@@ -57,7 +19,7 @@ Place place_at(PlacedTriangle at, vec2 uv) {
         instance = instance_at(at.instance);
     }
     for (uint i = 0u; i < 3u; i++) {
-        Corner corner = corner_at(3u * at.triangle + i);
+        Corner corner = CORNER(Corners, 3u * at.triangle + i);
         float weight = i == 0u ? 1.0 - uv.x - uv.y : (i == 1u ? uv.x : uv.y);
         place.sets += weight * vec4(corner.first, corner.second);
         place.color += weight * vec4(unpackHalf2x16(corner.color.x), unpackHalf2x16(corner.color.y));
@@ -72,13 +34,6 @@ Place place_at(PlacedTriangle at, vec2 uv) {
         place.tangent += weight * vec4(tangent * abs(corner.bitangent), corner.bitangent);
     }
     return place;
-}
-
-TextureLookup lookup_at(uint i) {
-    uvec4 row_u = TEXEL_BITS(Textures, 3u * i);
-    uvec4 row_v = TEXEL_BITS(Textures, 3u * i + 1u);
-    uvec4 rest = TEXEL_BITS(Textures, 3u * i + 2u);
-    return TextureLookup(uintBitsToFloat(row_u.xyz), row_u.w, uintBitsToFloat(row_v.xyz), row_v.w, rest.x, 0u, 0u, 0u);
 }
 
 // The texel of an image of so many along one side that stands at a place.
@@ -112,7 +67,7 @@ vec4 texel_at(TextureLookup lookup, float x, float y) {
 
 // The value of a texture, RGBA, linear. There are no mip levels: a pixel is the mean of many places.
 vec4 texture_value(uint index, Place place) {
-    TextureLookup lookup = lookup_at(index);
+    TextureLookup lookup = TEXTURE_LOOKUP(Textures, index);
     vec3 set = vec3((lookup.flags & SECOND_SET) != 0u ? place.sets.zw : place.sets.xy, 1.0);
     vec2 at = vec2(dot(lookup.row_u, set), dot(lookup.row_v, set)) * vec2(lookup.size & 0xffffu, lookup.size >> 16u);
     // Past that, floats have no texels apart; NaN fails the comparison.
@@ -154,16 +109,11 @@ Material material_of(inout Surface surface) {
         return material;
     }
     Place place = place_at(surface.triangle, surface.uv);
-    uvec4 first = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 5u);
-    uvec4 second = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 6u);
-    uvec4 third = uvec4(NO_TEXTURE);
-    float coat_normal_scale = 0.0;
-    if (CLEARCOAT) {
-        third.xy = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 8u).zw;
-        uvec4 rest = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 9u);
-        third.z = rest.x;
-        coat_normal_scale = uintBitsToFloat(rest.y);
-    }
+    // Loaded where they are used: from before `place_at` on they would hold registers.
+    Material maps = material_at(surface.material);
+    uvec4 first = uvec4(maps.color_texture, maps.metal_texture, maps.normal_texture, maps.emission_texture);
+    uvec3 second = uvec3(maps.transmission_texture, maps.specular_texture, maps.specular_color_texture);
+    uvec3 third = uvec3(maps.coat_texture, maps.coat_roughness_texture, maps.coat_normal_texture);
     material.base_color *= place.color.rgb;
     // One loop, so that the code that looks a texture up is there once.
     for (uint i = 0u; i < 7u || (CLEARCOAT && i < 10u); i++) {
@@ -179,7 +129,7 @@ Material material_of(inout Surface surface) {
             material.metallic *= value.b;
         } else if (i == 2u) {
             surface.shading_normal =
-                leaning_normal(surface.shading_normal, surface, place, value.rgb, uintBitsToFloat(second.w));
+                leaning_normal(surface.shading_normal, surface, place, value.rgb, maps.normal_scale);
         } else if (i == 3u) {
             material.emission *= value.rgb;
         } else if (i == 4u) {
@@ -195,7 +145,7 @@ Material material_of(inout Surface surface) {
             material.coat_roughness *= value.g;
         } else if (CLEARCOAT) {
             surface.coat_normal =
-                leaning_normal(surface.coat_normal, surface, place, value.rgb, coat_normal_scale);
+                leaning_normal(surface.coat_normal, surface, place, value.rgb, maps.coat_normal_scale);
         }
     }
     material.base_color = min(material.base_color, 1.0);
@@ -208,15 +158,13 @@ Material emitter_of(Surface surface) {
     bool textured = TEXTURED && (surface.flags & TEXTURED_TRIANGLE) != 0u;
     if (textured) {
         Place place = place_at(surface.triangle, surface.uv);
-        uint emission = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 5u).w;
-        if (emission != NO_TEXTURE) {
-            material.emission *= texture_value(emission, place).rgb;
+        Material maps = material_at(surface.material);
+        if (maps.emission_texture != NO_TEXTURE) {
+            material.emission *= texture_value(maps.emission_texture, place).rgb;
         }
-        if (CLEARCOAT) {
-            uint coat = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 8u).z;
-            if (coat != NO_TEXTURE) {
-                material.coat *= texture_value(coat, place).r;
-            }
+        bool coated = CLEARCOAT && maps.coat_texture != NO_TEXTURE;
+        if (coated) {
+            material.coat *= texture_value(maps.coat_texture, place).r;
         }
     }
     return material;
@@ -228,16 +176,15 @@ float share_there(Surface surface) {
     if (!see_through) {
         return 1.0;
     }
-    uvec4 mode = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 7u);
-    float alpha = uintBitsToFloat(mode.z);
+    Material material = material_at(surface.material);
+    float alpha = material.alpha;
     bool textured = TEXTURED && (surface.flags & TEXTURED_TRIANGLE) != 0u;
     if (textured) {
         Place place = place_at(surface.triangle, surface.uv);
-        uint color = TEXEL_BITS(Materials, MATERIAL_TEXELS * surface.material + 5u).x;
         alpha *= place.color.a;
-        if (color != NO_TEXTURE) {
-            alpha *= texture_value(color, place).a;
+        if (material.color_texture != NO_TEXTURE) {
+            alpha *= texture_value(material.color_texture, place).a;
         }
     }
-    return mode.x == MASK ? (alpha < uintBitsToFloat(mode.y) ? 0.0 : 1.0) : clamp(alpha, 0.0, 1.0);
+    return material.alpha_mode == MASK ? (alpha < material.alpha_cutoff ? 0.0 : 1.0) : clamp(alpha, 0.0, 1.0);
 }

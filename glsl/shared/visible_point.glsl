@@ -1,15 +1,4 @@
-// The paper's hitpoint: where a camera path met a matte surface.
-struct VisiblePoint {
-    vec4 position_object; // xyz: render space; w: uint bits, object, NO_OBJECT where the path found no matte surface
-    vec4 weight_normal;   // rgb: path throughput × BRDF (1/sr); w: uint bits, octahedral geometric normal on the
-                          // viewer's side
-    vec4 emitted_normal;  // rgb: radiance that the path saw by itself; w: uint bits, octahedral shading normal, same side
-};
-
-#define VISIBLE_POINT(i) \
-    VisiblePoint(TEXEL(VisiblePoints, 3u * (i)), TEXEL(VisiblePoints, 3u * (i) + 1u), TEXEL(VisiblePoints, 3u * (i) + 2u))
-
-const uint NO_OBJECT = 0xffffffffu;
+// Where visible points lie. Include after settings.glsl.
 
 const uint TILE = 8u;
 

@@ -152,7 +152,7 @@ void main() {
         return;
     }
     uint slot = receiver % slots();
-    VisiblePoint visible_point = VISIBLE_POINT(slot);
+    VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
     if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
         return;
     }

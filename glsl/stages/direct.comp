@@ -117,7 +117,7 @@ LightSample sample_light(vec3 position, vec3 normal, vec3 origin, uint of_source
     sampled.ignored = NO_TRIANGLE;
     sampled.delta = false;
     if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
-        Arriving arriving = arriving_from(punctual_light_at(chosen), light.kind, origin, u.yz);
+        Arriving arriving = arriving_from(light, origin, u.yz);
         sampled.ray = arriving.ray;
         sampled.end = arriving.end;
         sampled.towards = normalize(arriving.ray);
@@ -219,7 +219,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     float bsdf_sampling = is_near_light(position) ? settings.bsdf_sampling : 0.0;
     float reflections = 0.0; // of the directions of the BSDF
     if (GLOSSY) {
-        Gloss gloss = GLOSS(slot);
+        Gloss gloss = GLOSS(GlossOf, slot);
         reflector = reflector_of(gloss);
         viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
         if (reflector.alpha > 0.0 && settings.near_light_count > 0u) {
@@ -311,7 +311,7 @@ void main() {
     if (slot >= slots() || status.again != 0u) {
         return;
     }
-    VisiblePoint visible_point = VISIBLE_POINT(slot);
+    VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
     bool has_object = floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
     bool met = has_object || floatBitsToUint(visible_point.weight_normal.w) != 0u;
     coverage[slot].met += met ? 1u : 0u;

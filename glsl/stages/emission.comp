@@ -29,7 +29,6 @@ void main() {
     }
     Random random = random_of_path(path);
     Emission emission = emit(random);
-    path_starts[path] = PathStart(vec4(emission.origin, uintBitsToFloat(emission.ignored.triangle)),
-                                  vec4(emission.direction, emission.inverse_range),
-                                  vec4(emission.flux, uintBitsToFloat(emission.light)));
+    path_starts[path] = PathStart(emission.origin, emission.ignored.triangle, emission.direction, emission.inverse_range,
+                                  emission.flux, emission.light);
 }

@@ -54,20 +54,18 @@ struct Path {
 };
 
 Path path_from(uint start) {
-    vec4 origin_triangle = TEXEL(PathStarts, 3u * start);
-    vec4 direction_range = TEXEL(PathStarts, 3u * start + 1u);
-    vec4 flux_light = TEXEL(PathStarts, 3u * start + 2u);
+    PathStart from = PATH_START(PathStarts, start);
     Path path;
-    path.origin = origin_triangle.xyz;
-    path.direction = direction_range.xyz;
-    path.flux = flux_light.rgb;
+    path.origin = from.origin;
+    path.direction = from.direction;
+    path.flux = from.flux;
     path.depth = 0u;
-    path.ignored = PlacedTriangle(floatBitsToUint(origin_triangle.w), NO_INSTANCE);
-    path.media = media_of_light(floatBitsToUint(flux_light.w));
+    path.ignored = PlacedTriangle(from.triangle, NO_INSTANCE);
+    path.media = media_of_light(from.light);
     path.wavelength = 0.0;
     path.seen_directly = true;
     path.caustic = true;
-    path.inverse_range = direction_range.w;
+    path.inverse_range = from.inverse_range;
     return path;
 }
 

@@ -62,7 +62,7 @@ void main() {
         has_surface = has_surface || coverage[slot].surrounded > 0u;
         // Slots of a pixel share its paths.
         met = max(met, coverage[slot].met);
-        VisiblePoint visible_point = VISIBLE_POINT(slot);
+        VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
         bool lies_behind_glass =
             sum.high.w > 0.0 && floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
         for (uint map = 0u; map < settings.photon_maps; map++) {

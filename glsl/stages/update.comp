@@ -50,7 +50,7 @@ void main() {
     if (slot >= slots() || status.again != 0u) {
         return;
     }
-    VisiblePoint visible_point = VISIBLE_POINT(slot);
+    VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
     if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
         return;
     }

@@ -9,7 +9,7 @@ use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
 use super::sampling::decode_direction;
 use super::surface::{Surface, surface_of};
 use super::vector::rgb;
-use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED};
+use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED_TRIANGLE};
 use crate::random::Random;
 use crate::scene::PackedScene;
 
@@ -58,7 +58,7 @@ fn value(scene: &PackedScene, texture: u32, place: &Place) -> Option<DVec4> {
 
 /// Gives a surface the material of its place. A texture of normals turns its shading normal.
 pub(super) fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
-    if surface.flags & TEXTURED == 0 {
+    if surface.flags & TEXTURED_TRIANGLE == 0 {
         return;
     }
     let place = Place::of(scene, surface.triangle, surface.uv);
@@ -127,7 +127,7 @@ pub(super) fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
     }
     let material = &surface.material;
     let mut alpha = f64::from(material.alpha);
-    if surface.flags & TEXTURED != 0 {
+    if surface.flags & TEXTURED_TRIANGLE != 0 {
         let place = Place::of(scene, surface.triangle, surface.uv);
         alpha *= place.color.w * value(scene, material.color_texture, &place).map_or(1.0, |value| value.w);
     }

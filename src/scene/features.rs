@@ -2,7 +2,7 @@
 
 use crate::layout::{
     BACK_HIDDEN, BACKED, COINCIDENT, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT,
-    SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED, TOUCHED, TRIANGLE_LIGHT,
+    SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED_TRIANGLE, TOUCHED, TRIANGLE_LIGHT,
 };
 
 /// [`Material::surface`] of a mirror.
@@ -115,7 +115,7 @@ impl SceneFeatures {
             features.culling |= material.flags & BACK_HIDDEN != 0;
             features.coat |= material.coat > 0.0;
             features.specular_glass |= glass && material.flags & SPECULAR_CHANGED != 0;
-            features.textured |= triangle.flags & TEXTURED != 0;
+            features.textured |= triangle.flags & TEXTURED_TRIANGLE != 0;
             features.alpha |= triangle.flags & SEE_THROUGH != 0;
             features.contact |= triangle.flags & TOUCHED != 0;
             features.coincidence |= triangle.flags & (COINCIDENT | BACKED) != 0;

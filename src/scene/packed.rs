@@ -18,7 +18,7 @@ use super::{
 use crate::layout::{
     BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, HavelTriangle, Instance, Light, LightSource, MASK, MIRRORED,
     Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, RANK, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED,
-    ShadingTriangle, TEXTURED, TRIANGLE_LIGHT, TextureLookup,
+    ShadingTriangle, TEXTURED_TRIANGLE, TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// Sources of light of which each is asked by a ray of its own; of more one is chosen.
@@ -317,7 +317,7 @@ fn shading_triangle(scene: &Scene, index: u32, material_index: u32, corners: &[V
         object: triangle.object,
         material: material_index,
         flags: if smooth_shaded { SMOOTH_SHADED } else { 0 }
-            | if textured { TEXTURED } else { 0 }
+            | if textured { TEXTURED_TRIANGLE } else { 0 }
             | if material.alpha == Alpha::Opaque {
                 0
             } else {

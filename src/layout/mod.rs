@@ -1,104 +1,35 @@
-//! Every struct that host and device share. `tests/layout.rs` compares each with the reflected GLSL struct of its name.
+//! Every struct and number that host and kernels share, written once: `build/layout.rs` makes GLSL of this module, which is
+//! why it knows no other. `tests/layout.rs` compares each struct with the reflected one.
+
+pub mod constants;
+mod shape;
 
 use bytemuck::{Pod, Zeroable};
 
-/// Object of a visible point whose path met no matte surface.
-pub const NO_OBJECT: u32 = u32::MAX;
+pub use constants::*;
+pub use shape::{Scalar, Shape, Shared};
 
-/// Bit of a photon's object: since the light it has met mirrors and glass alone, in a scene that gathers such photons apart.
-pub const CAUSTIC: u32 = 1 << 31;
+/// A field of a struct.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FieldLayout {
+    /// Its name.
+    pub name: &'static str,
+    /// Bytes from the struct's beginning.
+    pub offset: usize,
+    /// Its type.
+    pub shape: Shape,
+}
 
-/// Shells around the camera that have grids of their own.
-pub const SHELLS: usize = 8;
-
-/// Light of a triangle that doesn't emit.
-pub const NO_LIGHT: u32 = u32::MAX;
-
-/// [`Light::kind`] of a triangle that emits.
-pub const TRIANGLE_LIGHT: u32 = 0;
-/// [`Light::kind`] of a point that shines in all directions.
-pub const POINT_LIGHT: u32 = 1;
-/// [`Light::kind`] of a point that shines into a cone.
-pub const SPOT_LIGHT: u32 = 2;
-/// [`Light::kind`] of a light so far away that its rays are parallel.
-pub const DIRECTIONAL_LIGHT: u32 = 3;
-/// [`Light::kind`] of the environment. There is one at the most, and it is the last light.
-pub const ENVIRONMENT_LIGHT: u32 = 4;
-
-/// Bit of a reference to a [`BvhRecord`]: it is a triangle of a leaf.
-pub const LEAF: u32 = 1 << 31;
-
-/// Kind of a leaf's [`BvhRecord`]: where an instance puts its triangles. The next record is its [`RAY_RECORD`].
-pub const PLACEMENT_RECORD: u32 = 1;
-/// Kind of a leaf's [`BvhRecord`]: how rays come to the space of an instance's triangles.
-pub const RAY_RECORD: u32 = 2;
-
-/// Bit of [`ShadingTriangle::flags`]: the shading normals differ from the geometric one.
-pub const SMOOTH_SHADED: u32 = 1;
-/// Bit of [`ShadingTriangle::flags`]: a dielectric's, and it may lie on another face.
-pub const TOUCHED: u32 = 2;
-/// Bit of [`ShadingTriangle::flags`]: its material depends on the place, by textures or its corners' colours.
-pub const TEXTURED: u32 = 4;
-/// Bit of [`ShadingTriangle::flags`]: parts of it may not be there, see [`Material::alpha_mode`].
-pub const SEE_THROUGH: u32 = 8;
-/// Bit of [`ShadingTriangle::flags`]: no dielectric's, and it lies on a face of another object that looks to the same side or
-/// shines to it.
-pub const COINCIDENT: u32 = 16;
-/// Bit of [`ShadingTriangle::flags`]: no dielectric's, and its back lies on the back of another object's face.
-pub const BACKED: u32 = 32;
-/// From this bit on [`ShadingTriangle::flags`] and [`Instance::flags`] have a dielectric's rank: where several overlap, the
-/// lowest is there.
-pub const RANK: u32 = 16;
-
-/// Bit of [`Instance::flags`]: fronts become backs.
-pub const MIRRORED: u32 = 1;
-
-/// [`Material::flags`]: the back emits as the front does.
-pub const BACK_EMITS: u32 = 1;
-/// [`Material::flags`]: no camera sees the back.
-pub const BACK_HIDDEN: u32 = 2;
-/// [`Material::flags`]: a dielectric that reflects another part of the light than its index says.
-pub const SPECULAR_CHANGED: u32 = 4;
-
-/// Below this α of GGX camera paths follow reflections.
-pub const FOLLOWED_ALPHA: f64 = 0.1;
-
-/// Texture of a material that has none there.
-pub const NO_TEXTURE: u32 = u32::MAX;
-
-/// [`Material::alpha_mode`] of what is all there.
-pub const OPAQUE: u32 = 0;
-/// [`Material::alpha_mode`] of what is there where alpha reaches the cutoff.
-pub const MASK: u32 = 1;
-/// [`Material::alpha_mode`] of what is there with alpha as probability.
-pub const BLEND: u32 = 2;
-
-/// Bit of [`TextureLookup::flags`]: the second set of coordinates.
-pub const SECOND_SET: u32 = 1;
-/// Bit of [`TextureLookup::flags`]: texels hold sRGB.
-pub const SRGB: u32 = 2;
-/// Bit of [`TextureLookup::flags`]: the nearest texel instead of a blend of four.
-pub const NEAREST: u32 = 4;
-/// Place of the wrap along u in [`TextureLookup::flags`]: [`REPEAT`], [`CLAMP`] or [`MIRROR_REPEAT`].
-pub const WRAP_U: u32 = 4;
-/// Place of the wrap along v.
-pub const WRAP_V: u32 = 6;
-/// Wrap: begins anew.
-pub const REPEAT: u32 = 0;
-/// Wrap: the texel at the edge goes on.
-pub const CLAMP: u32 = 1;
-/// Wrap: goes back and forth.
-pub const MIRROR_REPEAT: u32 = 2;
-
-/// Bit of [`StatusCounters::again`]: a lane's photons or a batch's didn't fit.
-pub const PHOTONS_DID_NOT_FIT: u32 = 1;
-/// Bit of [`StatusCounters::again`]: a lane's paths need more loop iterations than the driver gives.
-pub const LANES_TOO_LONG: u32 = 2;
-/// Bit of [`StatusCounters::again`]: a visible point has more photons to test than loop iterations.
-pub const GATHERS_TOO_LONG: u32 = 4;
-
-/// A field's name, offset and size in bytes.
-pub type FieldLayout = (&'static str, usize, usize);
+/// A struct.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Its name.
+    pub name: &'static str,
+    /// Bytes.
+    pub size: usize,
+    /// In order.
+    pub fields: &'static [FieldLayout],
+}
 
 /// Declares structs of the device's layout and [`LAYOUTS`], which lists their fields.
 macro_rules! device_structs {
@@ -114,11 +45,19 @@ macro_rules! device_structs {
             }
             const _: () = assert!(size_of::<$name>() == $size);
         )*
-        /// Name and fields of every struct of this module.
-        pub const LAYOUTS: &[(&str, &[FieldLayout])] = &[
-            $((stringify!($name), &[
-                $((stringify!($field), std::mem::offset_of!($name, $field), size_of::<$type>()),)*
-            ]),)*
+        /// Every struct of this module.
+        pub const LAYOUTS: &[Layout] = &[
+            $(Layout {
+                name: stringify!($name),
+                size: $size,
+                fields: &[
+                    $(FieldLayout {
+                        name: stringify!($field),
+                        offset: std::mem::offset_of!($name, $field),
+                        shape: <$type as Shared>::SHAPE,
+                    },)*
+                ],
+            },)*
         ];
     };
 }
@@ -242,7 +181,7 @@ device_structs! {
         pub object: u32,
         /// Index of its material.
         pub material: u32,
-        /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED`], [`SEE_THROUGH`], [`COINCIDENT`], [`BACKED`], and the rank from bit
+        /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED_TRIANGLE`], [`SEE_THROUGH`], [`COINCIDENT`], [`BACKED`], and the rank from bit
         /// [`RANK`] on; what instances share has none.
         pub flags: u32,
         /// Index of its light, the first of those of its parts, or [`NO_LIGHT`].
@@ -462,12 +401,18 @@ device_structs! {
 
     /// Where a photon path starts.
     pub struct PathStart: 48 {
-        /// xyz: position; w: u32 bits, the triangle that it leaves, u32::MAX for none.
-        pub origin_triangle: [f32; 4],
-        /// xyz: unit vector; w: 1 over the range of a punctual light, 0 where it reaches any distance.
-        pub direction_range: [f32; 4],
-        /// rgb: flux, not divided by the emitted paths, 0 of a path that isn't to be traced; w: u32 bits, the light.
-        pub flux_light: [f32; 4],
+        /// Position.
+        pub origin: [f32; 3],
+        /// The triangle that it leaves, u32::MAX for none.
+        pub triangle: u32,
+        /// Unit vector.
+        pub direction: [f32; 3],
+        /// 1 over the range of a punctual light, 0 where it reaches any distance.
+        pub inverse_range: f32,
+        /// Not divided by the emitted paths; 0 of a path that isn't to be traced.
+        pub flux: [f32; 3],
+        /// The light that it leaves.
+        pub light: u32,
     }
 
     /// A photon.

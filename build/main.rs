@@ -1,7 +1,10 @@
-//! Compiles `glsl/stages/*.comp` to SPIR-V, reflects what each stage binds, and writes the `shaders` module.
+//! Compiles `glsl/stages/*.comp` to SPIR-V, reflects what each stage binds, and writes the `shaders` module. What host and
+//! kernels share, `layout.glsl` and `settings.glsl`, is generated.
 //!
 //! A block's name in GLSL is its buffer's name in [`BufferId`](src/stage.rs): a name without a variant of that enum
 //! fails the compilation of the generated module. Bindings are numbered by the compiler and never written by hand.
+
+mod layout;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,7 +19,8 @@ use spirq::var::Variable;
 
 fn main() -> Result<()> {
     println!("cargo:rerun-if-changed=glsl");
-    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=build");
+    println!("cargo:rerun-if-changed=src/layout");
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
     let out = PathBuf::from(env::var("OUT_DIR")?);
 
@@ -25,6 +29,14 @@ fn main() -> Result<()> {
         .collect::<std::io::Result<_>>()?;
     sources.retain(|path| path.extension().is_some_and(|extension| extension == "comp"));
     sources.sort();
+
+    // For whoever wants to read them, or compile a stage with another tool.
+    for name in layout::INCLUDES {
+        fs::write(
+            out.join(name),
+            layout::include(name).context("a file that is generated")?,
+        )?;
+    }
 
     let compiler = shaderc::Compiler::new().context("shaderc: no compiler")?;
     let mut module = String::new();
@@ -35,10 +47,12 @@ fn main() -> Result<()> {
             .and_then(|stem| stem.to_str())
             .context("stage's file name")?
             .to_owned();
-        let named = compile(&compiler, source, &root, shaderc::OptimizationLevel::Zero)?;
-        let optimised = compile(&compiler, source, &root, shaderc::OptimizationLevel::Performance)?;
+        let text = fs::read_to_string(source)?;
+        let file = source.strip_prefix(&root)?.display().to_string();
+        let named = compile(&compiler, &text, &file, &root, shaderc::OptimizationLevel::Zero)?;
+        let optimised = compile(&compiler, &text, &file, &root, shaderc::OptimizationLevel::Performance)?;
         fs::write(out.join(format!("{name}.spv")), optimised.as_binary_u8())?;
-        let entry_point = reflect(named.as_binary()).with_context(|| source.display().to_string())?;
+        let entry_point = reflect(named.as_binary(), false).with_context(|| source.display().to_string())?;
         check_bindings(optimised.as_binary(), &entry_point).with_context(|| source.display().to_string())?;
         describe(&mut module, &name, &entry_point).with_context(|| source.display().to_string())?;
         names.push(name.to_uppercase());
@@ -54,13 +68,22 @@ fn main() -> Result<()> {
                 .join(", ")
         }
     )?;
+    let probe = compile(
+        &compiler,
+        &layout::probe(),
+        "probe",
+        &root,
+        shaderc::OptimizationLevel::Zero,
+    )?;
+    describe_structs(&mut module, &reflect(probe.as_binary(), true)?)?;
     fs::write(out.join("shaders.rs"), module)?;
     Ok(())
 }
 
 fn compile(
     compiler: &shaderc::Compiler,
-    source: &Path,
+    text: &str,
+    file: &str,
     root: &Path,
     level: shaderc::OptimizationLevel,
 ) -> Result<shaderc::CompilationArtifact> {
@@ -71,21 +94,23 @@ fn compile(
     options.set_warnings_as_errors();
     options.set_include_callback(|name, _, _, _| {
         let path = root.join("glsl/shared").join(name);
-        let content = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let content = match layout::include(name) {
+            Some(generated) => generated,
+            None => fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?,
+        };
         Ok(shaderc::ResolvedInclude {
             resolved_name: path.display().to_string(),
             content,
         })
     });
-    let text = fs::read_to_string(source)?;
-    let file = source.strip_prefix(root)?.display().to_string();
-    Ok(compiler.compile_into_spirv(&text, shaderc::ShaderKind::Compute, &file, "main", Some(&options))?)
+    Ok(compiler.compile_into_spirv(text, shaderc::ShaderKind::Compute, file, "main", Some(&options))?)
 }
 
-fn reflect(spirv: &[u32]) -> Result<EntryPoint> {
+/// `unused`: also what the kernel declares and doesn't use.
+fn reflect(spirv: &[u32], unused: bool) -> Result<EntryPoint> {
     let mut entry_points = ReflectConfig::new()
         .spv(spirv)
-        .ref_all_rscs(false)
+        .ref_all_rscs(unused)
         .reflect()
         .map_err(|error| anyhow::anyhow!("{error}"))?;
     ensure!(
@@ -189,6 +214,26 @@ fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result
         workgroup_size(entry_point)?,
         bindings.join(", "),
         constants.join(", ")
+    )?;
+    Ok(())
+}
+
+/// Appends `STRUCTS`, the element of each buffer that the probe binds.
+fn describe_structs(module: &mut String, entry_point: &EntryPoint) -> Result<()> {
+    let mut structs = Vec::new();
+    for variable in &entry_point.vars {
+        if let Variable::Descriptor {
+            ty: Type::Struct(block),
+            ..
+        } = variable
+        {
+            structs.push(fields(element(block))?);
+        }
+    }
+    writeln!(
+        module,
+        "/// Every struct of `layout`, as storage buffers have it.\npub static STRUCTS: &[StructLayout] = &[{}];",
+        structs.join(", ")
     )?;
     Ok(())
 }
