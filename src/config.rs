@@ -4,12 +4,14 @@ mod sizes;
 mod tiles;
 
 pub use sizes::{
-    CURVE_BITS, DEMAND_BITS, EXHAUSTIVE_RANGE, GROUP, LLOYD_ROUNDS, Limits, MOST_EMISSION_CELLS, MOST_TARGETS, NO_SLOT,
-    PPM_SLOTS, Probe, RUN_ON_CPU, SCAN_BLOCK, SORT_DIGIT_BITS, SORT_TILE, Sizes, TILE,
+    EXHAUSTIVE_RANGE, LLOYD_ROUNDS, Limits, MOST_EMISSION_CELLS, MOST_TARGETS, PPM_SLOTS, Probe, RUN_ON_CPU,
+    SCAN_BLOCK, SORT_DIGIT_BITS, SORT_TILE, Sizes,
 };
 pub use tiles::pixel_of;
 
 use crate::error::{Error, Result};
+pub use crate::layout::SEQUENCES;
+use crate::layout::{ASKS_EVERY, CONGRUENTIAL, COVERAGE_WHOLE, INDEPENDENT, SOBOL};
 
 /// Which visible points an iteration uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -68,13 +70,14 @@ impl EmissionChoice {
 
 /// Where the numbers of paths come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[repr(u32)]
 pub enum Sampler {
     /// Scrambled Sobol' sequences: samples that spread evenly, over an iteration's photons and over a pixel's iterations.
-    Sobol = 0,
+    Sobol = SOBOL,
     /// Independent numbers, from a hash.
-    Independent = 1,
+    Independent = INDEPENDENT,
     /// A congruential generator for each path, as in the paper. Neighbouring paths are correlated: for comparison alone.
-    Congruential = 2,
+    Congruential = CONGRUENTIAL,
 }
 
 impl Sampler {
@@ -150,12 +153,6 @@ impl Default for RenderConfig {
 
 /// Pixels of a picture's side at the most.
 pub const MAX_SIDE: u32 = 16384;
-
-/// Sequences of random numbers of low discrepancy that iterations take turns with: iteration i has the next numbers of
-/// sequence i mod 4. They are independent of each other, so that their spread tells the picture's error
-/// ([`crate::estimate`]), and those of pixels go on through the whole render, so that each converges nearly as fast as one for
-/// all would.
-pub const SEQUENCES: u32 = 4;
 
 /// How many of so many iterations are of a sequence.
 pub fn iterations_of(sequence: u32, iterations: u32) -> u32 {
@@ -240,13 +237,13 @@ impl RenderConfig {
     /// Points of the disc around each visible point that `coverage` asks in an iteration: many at first, since what few say
     /// is worse than nothing.
     pub fn coverage_points(&self, iteration: u32) -> u32 {
-        16 >> iteration.saturating_add(1).ilog2().min(4)
+        COVERAGE_WHOLE >> iteration.saturating_add(1).ilog2().min(COVERAGE_WHOLE.ilog2())
     }
 
     /// Whether shadow rays that end on glass go on in an iteration to say what light lies behind it: in the first ones, and
     /// then now and then, since it takes more rays. Of the first ones, points that have photons take a part in the very first.
     pub fn asks_behind_glass(&self, iteration: u32) -> bool {
-        iteration < 8 || iteration.is_multiple_of(32)
+        iteration < 8 || iteration.is_multiple_of(ASKS_EVERY)
     }
 
     /// Photon paths of the block before `iteration` that are of its sequence.

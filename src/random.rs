@@ -4,18 +4,20 @@
 mod sobol;
 
 use crate::config::{RenderConfig, SEQUENCES, Sampler};
+use crate::layout::{CAMERA_PATH, COVERAGE_SAMPLE, LIGHT_SAMPLE, PHOTON_PATH};
 
 /// What kind of path draws: mixed into the seed, so that kinds don't draw the same numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
 pub enum PathKind {
     /// From the camera; its number is the pixel's, row by row.
-    Camera = 0x6361_6d65,
+    Camera = CAMERA_PATH,
     /// Of a photon; its number is that within the iteration.
-    Photon = 0x7068_6f74,
+    Photon = PHOTON_PATH,
     /// From a visible point to a light; its number is the slot.
-    LightSample = 0x6c69_6768,
+    LightSample = LIGHT_SAMPLE,
     /// Of points around a visible point; its number is the slot.
-    Coverage = 0x636f_7665,
+    Coverage = COVERAGE_SAMPLE,
 }
 
 /// One of an iteration's paths of a pixel, or of what they lead to.

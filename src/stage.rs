@@ -94,9 +94,9 @@ pub enum BufferId {
     ObjectCells,
     /// Photons that have a place in each of those cells, u32.
     ObjectCellCursors,
-    /// Slots in the order of the workgroups that gather for them, u32; [`crate::config::NO_SLOT`] for fillers.
+    /// Slots in the order of the workgroups that gather for them, u32; [`crate::layout::NO_SLOT`] for fillers.
     PointOrder,
-    /// Slots by mesh and along a curve within it, u32; [`crate::config::NO_SLOT`] for fillers.
+    /// Slots by mesh and along a curve within it, u32; [`crate::layout::NO_SLOT`] for fillers.
     MeshOrder,
     /// Fillers of the meshes before, u32.
     MeshFillers,

@@ -1,10 +1,9 @@
 // k-means clusters of visible points. Points lie in MeshOrder along a curve, in runs of a workgroup's size that have one
 // mesh each; there is a cluster for each run, and a point may belong to the clusters of its own and the nearest runs.
 
-const uint RUN = 64u;
-const uint WINDOW = 4u; // runs on either side
+#include "layout.glsl"
 
-const uint NO_SLOT = 0xffffffffu;
+const uint WINDOW = 4u; // runs on either side
 
 layout(push_constant) uniform Push {
     uint runs;

@@ -2,9 +2,6 @@
 // that are no further apart are met at once. What is opaque is met before glass that lies on it, what shines or looks to the ray
 // before what doesn't. Include after alpha.glsl and media.glsl.
 
-// Cosine of the angle between planes up to which faces can lie on each other over more than a line.
-const float PARALLEL = 0.99;
-
 // What lies in the place where a ray meets matter.
 struct Interface {
     Surface surface; // that it meets

@@ -3,10 +3,6 @@
 // The cells are coarser than those that photons are gathered from, so that a disc reaches few of them, and each object has
 // its own. Places that share an entry by chance keep photons that nobody wants: that costs time, not truth.
 
-const uint DEMAND_BITS = 18u; // log2 of the table's entries
-// Cells are so many times larger than those of the gather's grid.
-const float COARSENING = 3.0;
-
 uint demand_entry(ivec3 cell, uint of_shell, uint object) {
     uvec3 c = uvec3(cell);
     uint hash = c.x * 0x9e3779b1u ^ c.y * 0x85ebca77u ^ c.z * 0xc2b2ae3du ^ (of_shell | object << 4u) * 0x27d4eb2fu;

@@ -1,9 +1,6 @@
 // Light of one wavelength. A path has none until it meets a boundary that bends each its own way; then it is chosen, evenly,
 // and what the path carries is coloured so that all wavelengths together are white.
 
-const float SHORTEST = 400.0; // nm
-const float LONGEST = 700.0;
-
 float lobe(float wavelength, float centre, float left, float right) {
     float t = (wavelength - centre) * (wavelength < centre ? left : right);
     return exp(-0.5 * t * t);
@@ -35,7 +32,7 @@ vec3 disperse(inout Material material, inout float wavelength, inout Random rand
     vec3 color = vec3(1.0);
     if (material.dispersion > 0.0) {
         if (wavelength == 0.0) {
-            wavelength = mix(SHORTEST, LONGEST, next4(random).x);
+            wavelength = mix(SHORTEST_WAVELENGTH, LONGEST_WAVELENGTH, next4(random).x);
             color = color_of(wavelength);
         }
         material.ior = ior_at(material, wavelength);

@@ -117,9 +117,6 @@ AimedStart emit_point(Light light, vec2 place, vec2 u, Target target) {
                       on_target);
 }
 
-// Where a sphere takes up more than this of the directions, sin² of its cone's angle, they are chosen by their cosine.
-const float WIDE_CONE = 0.5;
-
 AimedStart emit_triangle(uint index, Light light, vec2 place, vec2 u, float side, Target target) {
     PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
     Surface emitter = surface_at(triangle, point_of_light(index, place));

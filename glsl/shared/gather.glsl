@@ -7,8 +7,7 @@ uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer Radii2;
 uniform usamplerBuffer GlossOf;
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
-layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot and map, where they are counted
-const uint GATHERED_FOR = 0x80000000u;           // and whether it was its turn
+layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot and map, and GATHERED_FOR, where they are counted
 
 // The gather's side of a visible point.
 struct Receiver {

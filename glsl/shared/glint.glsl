@@ -2,8 +2,6 @@
 // have an extent. Include after alpha.glsl, bsdf.glsl,
 // contact.glsl and light.glsl.
 
-const uint GLINT = 0x676c696eu; // of numbers that belong to it; no instance has that index
-
 // BSDF · cos of a rough boundary of glass without its tint, as `meet_boundary` draws it: Walter and others, «Microfacet Models for Refraction
 // through Rough Surfaces», EGSR 2007. v and l are unit vectors away from the surface.
 vec3 glass_response(Facing facing, vec3 v, vec3 l, Material material, float outside) {

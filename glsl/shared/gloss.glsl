@@ -2,10 +2,9 @@
 // height-correlated masking (Heitz, «Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs», JCGT 3(2), 2014)
 // and Schlick's Fresnel. v and l are unit vectors to the viewer and to the light. Include after sampling.glsl.
 
-layout(constant_id = 9) const bool GLOSSY = false; // the scene has glossy surfaces
+#include "layout.glsl"
 
-// Below this α a boundary is a mirror.
-const float SMOOTH_ALPHA = 1e-3;
+layout(constant_id = 9) const bool GLOSSY = false; // the scene has glossy surfaces
 
 struct Reflector {
     vec3 diffuse;   // albedo of the base
@@ -24,9 +23,6 @@ Reflector reflector_of(Gloss gloss) {
     return Reflector(gloss.diffuse_viewer.rgb, vec3(unpackHalf2x16(gloss.rest.x), f0_b_f90.x), f0_b_f90.y,
                      abs(alpha_coat.x), unpackHalf2x16(gloss.rest.w), alpha_coat.y);
 }
-
-// α's sign: whether the material is coated.
-const uint COATED = 0x8000u;
 
 bool is_coated(Gloss gloss) {
     return (gloss.rest.z & COATED) != 0u;
@@ -54,9 +50,6 @@ vec3 fresnel(Reflector reflector, float cosine) {
 float through_to_base(Reflector reflector, float cosine) {
     return 1.0 - mix(reflector.over_base.x, reflector.over_base.y, schlick(cosine));
 }
-
-// Reflectance of a clear coat, whose index of refraction is 1.5.
-const float COAT_F0 = 0.04;
 
 // What a coat lets through to what lies below. KHR_materials_clearcoat takes the cosine to the viewer; that to the
 // microfacet's normal is the same where the coat is smooth, and both ways of the light are one.

@@ -22,9 +22,6 @@ Cone cone_of(vec4 sphere, vec3 from) {
     return Cone(way * inversesqrt(distance2), sin2 / (1.0 + sqrt(max(0.0, 1.0 - sin2))));
 }
 
-// A sphere that is seen within less than this, sin² of its cone's angle, is worth aiming at from a matte surface.
-const float NARROW_CONE = 0.25;
-
 // From a matte surface outside of what the camera sees hardly a photon finds there, and those that do carry the flux of all:
 // half of them are aimed there. Gives the direction in place of the cosine's, and what the flux is to be weighed with: cosine
 // over the density of both ways together, at most 2.

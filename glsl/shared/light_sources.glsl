@@ -6,10 +6,6 @@ layout(constant_id = 29) const bool MANY_SOURCES = false;
 
 uniform usamplerBuffer LightSources;
 
-// The part of all choices among those that can bring anything that is made without knowing the point: what is before a bright
-// one isn't known.
-const float WITHOUT_POINT = 0.1;
-
 LightSource light_source_at(uint i) {
     return LIGHT_SOURCE(LightSources, i);
 }

@@ -2,9 +2,6 @@
 // others don't count: Schmidt and Budge, «Simple Nested Dielectrics in Ray Traced Images», Journal of Graphics Tools 7(2), 2002.
 // Include after scene.glsl.
 
-// A medium's name: its object's rank, then its material. VACUUM comes last.
-const uint VACUUM = 0xffffffffu;
-
 // Their names in order, VACUUM where there are fewer. Of more than four the highest ranks are forgotten.
 struct Media {
     uint first;
@@ -13,6 +10,7 @@ struct Media {
 
 const Media IN_VACUUM = Media(VACUUM, uvec3(VACUUM));
 
+// A medium's name: its object's rank, then its material. VACUUM comes last.
 uint medium_of(Surface surface) {
     return (surface.flags & ~RANK_BELOW) | surface.material;
 }

@@ -1,9 +1,5 @@
 // Equations 2 and 3. Include after two_float.glsl and gather.glsl.
 
-// R² where it stops shrinking, and τ with it: far below what positions resolve, far above the smallest f32. With an α next
-// to 0 it takes eq. 2 a few photons to get there; from then on their density is that at this radius.
-const float SMALLEST_RADIUS2 = 1e-24;
-
 float count_of(uint low, uint high) {
     return float(high) * 4294967296.0 + float(low);
 }

@@ -1,6 +1,8 @@
 // A counter-based generator: the numbers of a path are a pure function of (path, iteration, dimension, seed), so any
 // invocation can draw any of them, and two runs draw the same.
 
+#include "layout.glsl"
+
 // PCG 4D: Jarzynski and Olano, «Hash Functions for GPU Rendering», JCGT 9(3), 2020.
 uvec4 pcg4d(uvec4 v) {
     v = v * 1664525u + 1013904223u;
@@ -18,9 +20,6 @@ uvec4 pcg4d(uvec4 v) {
 
 // Where numbers come from, see config::Sampler.
 layout(constant_id = 5) const uint SAMPLER = 0u;
-const uint SOBOL = 0u;
-const uint INDEPENDENT = 1u;
-const uint CONGRUENTIAL = 2u;
 
 #include "sobol.glsl"
 
@@ -36,18 +35,10 @@ struct Random {
     uint state;     // of the congruential generator
 };
 
-const uint CAMERA_PATH = 0x63616d65u;
-const uint PHOTON_PATH = 0x70686f74u;
-const uint LIGHT_SAMPLE = 0x6c696768u;
-const uint COVERAGE_SAMPLE = 0x636f7665u;
-
 Random random_for(uint kind, uint path, uint iteration, uint block, uint sequence, uint index, uint seed) {
     uint mixed = seed ^ kind;
     return Random(path, iteration, mixed, 0u, sequence, block, index, mixed + iteration * 0x9e3779b1u + path);
 }
-
-// Iterations take turns with so many sequences: see config::SEQUENCES.
-const uint SEQUENCES = 4u;
 
 // Of an iteration's paths of a pixel, or of what one of them leads to.
 struct CameraTurn {

@@ -1,5 +1,7 @@
 // The scene as the rays see it. Include after settings.glsl, sampling.glsl, gloss.glsl and texel.glsl.
 
+#include "layout.glsl"
+
 // What the scene has, see scene::SceneFeatures: there is no code for the rest.
 layout(constant_id = 6) const bool MIRRORS = true;
 layout(constant_id = 7) const bool DIELECTRICS = true;
@@ -27,10 +29,6 @@ const uint MISS = 0xffffffffu;
 const uint NO_INSTANCE = 0xffffffffu;
 
 const uint RANK_BELOW = 0xffffu; // bits of flags below RANK
-
-const uint MIRROR = 1u;
-const uint DIELECTRIC = 2u;
-const uint GLOSSY_SURFACE = 3u;
 
 // A triangle, and the instance that puts it where it is.
 struct PlacedTriangle {
@@ -241,8 +239,6 @@ Surface surface_at(Hit hit) {
 // triangle's plane, both a few roundings of the corners' coordinates: Pharr, Jakob and Humphreys, «Physically Based
 // Rendering», 3rd edition, 2016, section 3.9.5. Near the origin, where floats are fine, so is the step: what lies a
 // hundred-millionth of the scene away isn't jumped over.
-const float ROUNDINGS = 16.0 / 16777216.0;
-
 vec3 offset_origin(vec3 p, vec3 n, vec3 reach) {
     return p + ROUNDINGS * dot(abs(n), reach) * n;
 }

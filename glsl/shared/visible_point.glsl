@@ -1,7 +1,5 @@
 // Where visible points lie. Include after settings.glsl.
 
-const uint TILE = 8u;
-
 // Visible points are kept in the order of 8×8 tiles of pixels, each 4×2 of a tile together: neighbours in the picture
 // are neighbours in memory. The picture's edge leaves slots unused.
 uvec2 pixel_of(uint pixel_slot) {

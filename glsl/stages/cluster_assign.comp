@@ -17,7 +17,7 @@ layout(std430) writeonly buffer ClusterOf { uint cluster_of[]; }; // of each pla
 
 void main() {
     uint place = invocation_index();
-    if (place >= push.runs * RUN) {
+    if (place >= push.runs * GROUP) {
         return;
     }
     uint slot = mesh_order[place];
@@ -25,7 +25,7 @@ void main() {
     if (slot != NO_SLOT) {
         vec4 point = TEXEL(VisiblePoints, 3u * slot);
         float least = 1e30;
-        uvec2 window = window_of(place / RUN);
+        uvec2 window = window_of(place / GROUP);
         for (uint run = window.x; run < window.y; run++) {
             vec4 centre = TEXEL(Centroids, run);
             vec3 d = centre.xyz - point.xyz;

@@ -26,7 +26,7 @@ void main() {
     vec3 offset = vec3(0.0);
     uint count = 0u;
     uvec2 window = window_of(cluster);
-    for (uint place = window.x * RUN; place < window.y * RUN; place++) {
+    for (uint place = window.x * GROUP; place < window.y * GROUP; place++) {
         if (cluster_of[place] == cluster) {
             offset += TEXEL(VisiblePoints, 3u * mesh_order[place]).xyz - before.xyz;
             count += 1u;
@@ -35,5 +35,5 @@ void main() {
     centroids[cluster] = vec4(before.xyz + offset / float(max(count, 1u)), before.w);
     cluster_sizes[cluster] = count;
     // With the fillers that keep a workgroup from holding points of two clusters.
-    padded_sizes[cluster] = (count + RUN - 1u) / RUN * RUN;
+    padded_sizes[cluster] = (count + GROUP - 1u) / GROUP * GROUP;
 }

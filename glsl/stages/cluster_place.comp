@@ -19,7 +19,7 @@ void main() {
     }
     uint next = cluster_starts[cluster];
     uvec2 window = window_of(cluster);
-    for (uint place = window.x * RUN; place < window.y * RUN; place++) {
+    for (uint place = window.x * GROUP; place < window.y * GROUP; place++) {
         if (cluster_of[place] == cluster) {
             point_order[next] = mesh_order[place];
             next += 1u;

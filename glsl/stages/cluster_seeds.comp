@@ -22,7 +22,7 @@ void main() {
     vec4 first = vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT));
     vec3 offset = vec3(0.0); // from the first point: a sum of positions would cancel
     uint count = 0u;
-    for (uint i = run * RUN; i < (run + 1u) * RUN; i++) {
+    for (uint i = run * GROUP; i < (run + 1u) * GROUP; i++) {
         uint slot = mesh_order[i];
         if (slot != NO_SLOT) {
             vec4 position = TEXEL(VisiblePoints, 3u * slot);

@@ -23,7 +23,7 @@ layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push {
     uint iteration;
-    uint points; // a power of two up to WHOLE
+    uint points; // a power of two up to COVERAGE_WHOLE
 } push;
 
 uniform usamplerBuffer VisiblePoints;
@@ -31,14 +31,6 @@ uniform usamplerBuffer StatisticsOf;
 uniform usamplerBuffer GatheredOf;
 layout(std430) readonly buffer Radii2 { float radii2[]; };
 layout(std430) buffer CoverageOf { Coverage coverage[]; };
-
-// What an iteration counts for, whatever its points.
-const uint WHOLE = 16u;
-// A disc that has been covered in so many iterations, and wholly, is asked for in every eighth one alone, as its
-// neighbours are: discs only shrink.
-const uint TRUSTED = 4u;
-// Surfaces that are crossed on the way at the most.
-const uint MOST_CROSSINGS = 4u;
 
 // The side of an object that a ray meets.
 struct Side {
@@ -71,7 +63,7 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     Side entered;
     PlacedTriangle ignored = NO_TRIANGLE;
     Progress progress = AT_ORIGIN;
-    for (uint i = 0u; i < MOST_CROSSINGS; i++) {
+    for (uint i = 0u; i < COVERAGE_CROSSINGS; i++) {
         Hit hit = trace_from(origin, along, progress, 1.0, NO_TRIANGLE, false);
         if (hit.triangle == MISS) {
             break;
@@ -96,7 +88,7 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     vec3 down = -radius * n;
     Hit below = trace(origin + along, down, 1.0, NO_TRIANGLE, false);
     if (COINCIDENCE) {
-        for (uint i = 1u; i < MOST_CROSSINGS && below.triangle != MISS && !loops_cut; i++) {
+        for (uint i = 1u; i < COVERAGE_CROSSINGS && below.triangle != MISS && !loops_cut; i++) {
             Surface met = surface_at(below);
             bool glass = CONTACT && is_dielectric(material_at(met.material));
             bool lies_on = glass || (met.flags & (COINCIDENT | BACKED)) != 0u;
@@ -120,7 +112,7 @@ bool is_surrounded(VisiblePoint visible_point, vec2 u) {
     vec3 direction = cosine_direction(n, u);
     PlacedTriangle ignored = NO_TRIANGLE;
     bool scatters = false;
-    for (uint i = 0u; i <= MOST_CROSSINGS && !scatters; i++) {
+    for (uint i = 0u; i <= COVERAGE_CROSSINGS && !scatters; i++) {
         Hit hit = trace(origin, direction, 1e30, ignored, false);
         if (hit.triangle == MISS) {
             break;
@@ -160,11 +152,11 @@ void main() {
     uvec2 accepted = TEXEL_BITS(StatisticsOf, 3u * receiver).zw;
     bool has_photons = (accepted.x | accepted.y | TEXEL_BITS(GatheredOf, 2u * receiver).w) != 0u;
     Coverage before = coverage[receiver];
-    bool trusted = before.covered == before.asked && before.asked >= TRUSTED * WHOLE;
+    bool trusted = before.covered == before.asked && before.asked >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
     Random random = random_of_disc(slot, push.iteration, push.points, settings.seed);
     if (!has_photons && receiver < slots() && before.surrounded == 0u && !has_caustic_photons(slot)) {
         Random behind = random;
-        behind.dimension = WHOLE; // those of the disc
+        behind.dimension = COVERAGE_WHOLE; // those of the disc
         bool surrounded = is_surrounded(visible_point, next4(behind).xy) && !loops_cut;
         coverage[receiver].surrounded = surrounded ? 1u : 0u;
     }
@@ -181,6 +173,6 @@ void main() {
     if (loops_cut) {
         covered = push.points;
     }
-    coverage[receiver].covered = before.covered + covered * (WHOLE / push.points);
-    coverage[receiver].asked = before.asked + WHOLE;
+    coverage[receiver].covered = before.covered + covered * (COVERAGE_WHOLE / push.points);
+    coverage[receiver].asked = before.asked + COVERAGE_WHOLE;
 }

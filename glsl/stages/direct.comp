@@ -45,15 +45,6 @@ layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 layout(std430) buffer CoverageOf { Coverage coverage[]; };
 layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteration's sequence
 
-// A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
-const float ENDS_BEFORE = 16.0 / 16777216.0;
-
-// Glass surfaces that are crossed on the way to a light at the most.
-const uint MOST_CROSSINGS = 8u;
-// Photons from which on a point asks for what lies behind glass in the first of so many iterations alone.
-const uint SEASONED = 16u;
-const uint ASKS_EVERY = 32u;
-
 // Whether a shadow ray that ends on glass goes on.
 bool asks_behind_glass(uint slot) {
     bool asks = false;
@@ -264,7 +255,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     bool goes_on = largest(brings) > 0.0;
     while (goes_on) {
         hit = trace_visible(from, ray, AT_ORIGIN, sampled.end - passed, sampled.ignored, any, random);
-        goes_on = ASKS_BEHIND_GLASS && asks && hit.triangle != MISS && !loops_cut && crossings < MOST_CROSSINGS;
+        goes_on = ASKS_BEHIND_GLASS && asks && hit.triangle != MISS && !loops_cut && crossings < DIRECT_CROSSINGS;
         if (goes_on) {
             ShadingTriangle triangle = shading_triangle(hit.triangle);
             Material glass = material_at(triangle.material);

@@ -14,14 +14,6 @@ layout(local_size_x = 64) in;
 layout(std430) writeonly buffer Grid { GridShape grid; };
 layout(std430) readonly buffer RadiiOfShells { ShellRadii radii_of_shells[]; };
 
-// s / R where all radii are alike. Measured, see docs/gather.md.
-const float CELLS_TO_RADIUS = 1.5;
-// Render units. Positions resolve 6e-8: finer cells would gain nothing, and a visible point would reach too many of them.
-const float SMALLEST_CELL = 1.0 / 1048576.0;
-// Cells that the largest radius of a shell may span: the few points in the dark that have it must not hold up the rest. It
-// holds so few photons that cells of that size are nearly empty.
-const float MOST_CELLS = 8.0;
-
 void main() {
     uint i = invocation_index();
     if (i >= 2u * SHELLS) {

@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 #include "visible_point.glsl"
 #include "object_grid.glsl"
 
-const uint BITS = 6u; // of a coordinate
+const uint BITS = CURVE_BITS / 3u; // of a coordinate
 
 uniform usamplerBuffer VisiblePoints;
 layout(std430) writeonly buffer PointKeys { uint keys[]; };

@@ -8,13 +8,13 @@ use serde::Serialize;
 use super::median;
 use super::structure::{Structure, structure};
 use crate::backend::{Backend, DeviceDescription};
-use crate::config::{GROUP, Probe, RenderConfig, Sizes, Totals};
+use crate::config::{Probe, RenderConfig, Sizes, Totals};
 use crate::cpu::{self, Counts, Inputs};
 use crate::emission::Aim;
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, Tests, is_gather_stage};
 use crate::gpu::Device;
-use crate::layout::{Gathered, NO_OBJECT, Photon, Settings, VisiblePoint};
+use crate::layout::{GATHERED_FOR, GROUP, Gathered, NO_OBJECT, Photon, Settings, VisiblePoint};
 use crate::pipeline::Renderer;
 use crate::record::Run;
 use crate::scene::{Camera, PackedScene};
@@ -22,9 +22,6 @@ use crate::stage::BufferId;
 
 /// Microseconds that one gather may take; a slower method is measured on a share of the visible points.
 const BUDGET_US: f64 = 1e6;
-
-/// Bit of a slot's number of tests: it had its turn. As in `glsl/shared/gather.glsl`.
-const GATHERED_FOR: u32 = 1 << 31;
 
 /// What is measured.
 pub struct GatherBench<'a> {

@@ -2,11 +2,10 @@
 
 use serde::Serialize;
 
-use crate::config::{GROUP, NO_SLOT};
 use crate::cpu::pixel_of;
 use crate::error::Result;
 use crate::film::Image;
-use crate::layout::StatusCounters;
+use crate::layout::{GROUP, NO_SLOT, StatusCounters};
 use crate::pipeline::Renderer;
 use crate::stage::BufferId;
 

@@ -2,13 +2,11 @@
 
 use super::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
-    BehindGlass, Coverage, DirectSum, EmissionCell, Gathered, Gloss, GridShape, PathStart, Photon, SHELLS, ShellRadii,
-    Statistics, StatusCounters, VisiblePoint,
+    BehindGlass, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, Gloss, GridShape, PathStart, Photon,
+    SHELLS, ShellRadii, Statistics, StatusCounters, TILE, VisiblePoint,
 };
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
 
-/// Pixels of a tile's side: visible points lie in memory tile by tile.
-pub const TILE: u32 = 8;
 /// Visible points of a pixel at the most, where they are found once: glass splits the path while a slot is free.
 pub const PPM_SLOTS: u32 = 8;
 /// Spheres that photon paths are aimed at, at the most.
@@ -17,18 +15,10 @@ pub const MOST_TARGETS: u32 = 32;
 pub const MOST_EMISSION_CELLS: u32 = 4096;
 /// Photons that one launch of a gather that tests every photon looks at, below every known driver's loop limit.
 pub const EXHAUSTIVE_RANGE: u32 = 16_000;
-/// Visible points of a workgroup of the paper's orders: the workgroup size of `gather_*.comp`, `RUN` of `clusters.glsl`.
-pub const GROUP: u32 = 64;
-/// What an order of visible points has at a filler's place.
-pub const NO_SLOT: u32 = u32::MAX;
-/// Bits of a key along the space-filling curve of `point_curve.comp`.
-pub const CURVE_BITS: u32 = 18;
 /// Rounds of Lloyd's algorithm for the k-means clusters.
 pub const LLOYD_ROUNDS: u32 = 4;
 /// Visible points that an invocation of `gather_clustered.comp` has on a processor, a divisor of a tile's.
 pub const RUN_ON_CPU: u32 = 8;
-/// log2 of the entries of the table of what visible points want.
-pub const DEMAND_BITS: u32 = 18;
 /// Radii that the mean of a grid's radii is taken of, about: their sum has to fit a u32.
 const RADIUS_SAMPLES: u32 = 1 << 16;
 /// Numbers of a block of the prefix sum.

@@ -1,6 +1,6 @@
 //! The order of pixels in memory: `glsl/shared/visible_point.glsl`.
 
-use super::TILE;
+use crate::layout::TILE;
 
 /// The pixel of a slot, `None` where the tile reaches over the picture's edge. Tiles lie row by row; within a tile the
 /// bits of the number inside are, from the lowest, x0 x1 y0 x2 y1 y2.

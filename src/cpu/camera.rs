@@ -16,13 +16,13 @@ use super::intersect::{PlacedTriangle, Ray};
 use super::light::{emits, emitted_radiance};
 use super::media::{Media, transmittance};
 use super::sampling::{disc_point, encode_direction};
-use super::surface::{Facing, GLOSSY, MATTE, MIRROR, Surface};
+use super::surface::{Facing, Surface};
 use super::texture::{nearest_seen, nearest_visible};
 use super::tiles::{pixel_of, pixel_slots};
 use super::vector::{rgb, with_word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{FOLLOWED_ALPHA, Gloss, NO_OBJECT, VisiblePoint};
+use crate::layout::{FOLLOWED_ALPHA, GLOSSY_SURFACE, Gloss, MATTE, MIRROR, NO_OBJECT, VisiblePoint};
 use crate::random::{CameraTurn, PathKind, Random};
 
 /// What is left of a path that splits.
@@ -283,7 +283,7 @@ fn follow(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, slots: &mut [S
                 branch.throughput *= facing.choose_layer(&mut material, surface.coat_normal, incoming, u);
             }
             let kind = material.surface;
-            let (is_matte, is_glossy) = (kind == MATTE, kind == GLOSSY);
+            let (is_matte, is_glossy) = (kind == MATTE, kind == GLOSSY_SURFACE);
             // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
             let reflector = if is_glossy {
                 Reflector::of_material(&material)

@@ -5,14 +5,14 @@ use glam::DVec3;
 use super::Inputs;
 use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
 use super::media::{Media, Medium, bounded_medium, ior_of_medium};
-use super::surface::{DIELECTRIC, Facing, GLOSSY, ROUNDINGS, Surface, surface_of};
+use super::surface::{Facing, Surface, surface_of};
 use super::texture::{apply_textures, is_face_there, share_there};
 use super::vector::rgb;
-use crate::layout::{BACK_EMITS, BACK_HIDDEN, BACKED, COINCIDENT, Material, SEE_THROUGH, TOUCHED};
+use crate::layout::{
+    BACK_EMITS, BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, GLOSSY_SURFACE, Material, PARALLEL, ROUNDINGS,
+    SEE_THROUGH, TOUCHED,
+};
 use crate::random::Random;
-
-/// Cosine of the angle between planes up to which faces can lie on each other over more than a line.
-const PARALLEL: f64 = 0.99;
 
 /// What lies in the place where a ray meets matter.
 pub(super) struct Interface {
@@ -252,7 +252,7 @@ pub(super) fn choose_part(material: &mut Material, u: f64) -> (bool, f64) {
     if u < t {
         (true, u / t)
     } else {
-        material.surface = GLOSSY;
+        material.surface = GLOSSY_SURFACE;
         (true, (u - t) / (1.0 - t))
     }
 }

@@ -5,20 +5,15 @@ use rayon::prelude::*;
 
 use super::intersect::{Progress, Ray, nearest_hit, nearest_hit_from};
 use super::sampling::{basis, cosine_direction, decode_direction, disc_point};
-use super::surface::{DIELECTRIC, MATTE, Surface, offset_origin, reach_of, surface_of};
+use super::surface::{Surface, offset_origin, reach_of, surface_of};
 use super::texture::share_there;
 use super::vector::{word, xyz};
 use super::{FAR, Inputs};
-use crate::layout::{BACKED, COINCIDENT, Coverage, Gathered, NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint};
+use crate::layout::{
+    BACKED, COINCIDENT, COVERAGE_CROSSINGS, COVERAGE_TRUSTED, COVERAGE_WHOLE, Coverage, DIELECTRIC, Gathered, MATTE,
+    NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint,
+};
 use crate::random::Random;
-
-/// What an iteration counts for, whatever its points.
-const WHOLE: u32 = 16;
-/// A disc that has been covered in so many iterations, and wholly, is asked for in every eighth one alone, as
-/// its neighbours are: discs only shrink.
-const TRUSTED: u32 = 4;
-/// Surfaces that are crossed on the way at the most.
-const MOST_CROSSINGS: u32 = 4;
 
 /// Asks points of the disc of radius R around each visible point, for each photon map: past the edge of the object, or inside
 /// an opaque one that stands on it, there are no photons. As long as a point has had no photon, a ray into its hemisphere says
@@ -47,11 +42,11 @@ pub fn coverage(
             }
             // Without photons there is nothing to correct.
             let photons = statistics.accepted_low | statistics.accepted_high | word(gathered.flux_count);
-            let trusted = coverage.covered == coverage.asked && coverage.asked >= TRUSTED * WHOLE;
+            let trusted = coverage.covered == coverage.asked && coverage.asked >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
             let random = Random::of_disc(inputs.config, slot as u32, iteration, points);
             if photons == 0 && index < visible_points.len() && coverage.surrounded == 0 && !has_caustic_photons(slot) {
                 let mut behind = random;
-                behind.skip_to(WHOLE); // those of the disc
+                behind.skip_to(COVERAGE_WHOLE); // those of the disc
                 let [u, v, ..] = behind.next4();
                 coverage.surrounded = u32::from(is_surrounded(inputs, point, u, v));
             }
@@ -63,8 +58,8 @@ pub fn coverage(
                 let [u, v, ..] = random.sample_of(number, points).next4();
                 can_have_photons(inputs, point, radius, [u, v])
             });
-            coverage.covered += covered.count() as u32 * (WHOLE / points);
-            coverage.asked += WHOLE;
+            coverage.covered += covered.count() as u32 * (COVERAGE_WHOLE / points);
+            coverage.asked += COVERAGE_WHOLE;
         });
 }
 
@@ -95,7 +90,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, [u, 
         origin,
         direction: along,
     };
-    for _ in 0..MOST_CROSSINGS {
+    for _ in 0..COVERAGE_CROSSINGS {
         let Some(hit) = nearest_hit_from(inputs, ray, progress, 1.0, None) else {
             break;
         };
@@ -131,7 +126,7 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, [u, 
         direction: -radius * n,
     };
     let mut progress = Progress::AT_ORIGIN;
-    for _ in 0..MOST_CROSSINGS {
+    for _ in 0..COVERAGE_CROSSINGS {
         let Some(hit) = nearest_hit_from(inputs, down, progress, 1.0, None) else {
             return false;
         };
@@ -158,7 +153,7 @@ fn is_surrounded(inputs: &Inputs<'_>, point: &VisiblePoint, u: f64, v: f64) -> b
         reach_of(inputs.scene, word(point.position_object)),
     );
     let mut ignored = None;
-    for _ in 0..=MOST_CROSSINGS {
+    for _ in 0..=COVERAGE_CROSSINGS {
         let Some(hit) = nearest_hit(inputs, Ray { origin, direction }, FAR, ignored) else {
             return false;
         };

@@ -9,17 +9,10 @@ use glam::{IVec3, Vec3};
 use super::Seen;
 use super::resolve::share_of;
 use super::vector::{mean, word, xyz};
-use crate::config::DEMAND_BITS;
 use crate::layout::{
-    Coverage, DirectSum, GridShape, NO_OBJECT, SHELLS, Settings, ShellRadii, Statistics, VisiblePoint,
+    CELLS_TO_RADIUS, COARSENING, Coverage, DEMAND_BITS, DirectSum, GridShape, MOST_CELLS, NO_OBJECT, SHELLS,
+    SMALLEST_CELL, Settings, ShellRadii, Statistics, VisiblePoint,
 };
-
-/// s / R where all radii are alike; the smallest s; the largest R / s. As in `grid_setup.comp`.
-const CELLS_TO_RADIUS: f32 = 1.5;
-const SMALLEST_CELL: f32 = 1.0 / 1_048_576.0;
-const MOST_CELLS: f32 = 8.0;
-/// Cells are so many times larger than those of the gather's grid.
-const COARSENING: f32 = 3.0;
 
 /// What is wanted of photons at each place.
 #[derive(Debug, Clone)]

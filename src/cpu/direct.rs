@@ -18,13 +18,14 @@ use super::light_sources::{self, choose_light_for, choose_light_of, probability_
 use super::media::{Media, transmittance};
 use super::resolve::photons_of;
 use super::sampling::{cosine_direction, decode_direction};
-use super::surface::{DIELECTRIC, offset_origin, reach_of, surface_at, surface_of};
+use super::surface::{offset_origin, reach_of, surface_at, surface_of};
 use super::texture::{apply_textures, nearest_visible, share_there};
 use super::vector::{from_two_floats, rgb, to_two_floats, word, xyz};
 use super::{Counts, FAR, Inputs};
 use crate::config::Direct;
 use crate::layout::{
-    DirectSum, ENVIRONMENT_LIGHT, LightSource, NO_LIGHT, NO_OBJECT, Statistics, TRIANGLE_LIGHT, VisiblePoint,
+    ASKS_EVERY, DIELECTRIC, DIRECT_CROSSINGS, DirectSum, ENDS_BEFORE, ENVIRONMENT_LIGHT, LightSource, NO_LIGHT,
+    NO_OBJECT, SEASONED, Statistics, TRIANGLE_LIGHT, VisiblePoint,
 };
 use crate::random::{CameraTurn, PathKind, Random};
 
@@ -95,14 +96,6 @@ pub fn direct<'a>(
     });
 }
 
-/// A shadow ray ends this part of its length before the light, as it does on a device.
-const ENDS_BEFORE: f64 = 16.0 / 16_777_216.0;
-/// Glass surfaces that are crossed on the way to a light at the most.
-const MOST_CROSSINGS: u32 = 8;
-/// Photons from which on a point asks for what lies behind glass in the first of [`ASKS_EVERY`] iterations alone.
-const SEASONED: u32 = 16;
-const ASKS_EVERY: u32 = 32;
-
 /// What a ray meets beyond glass.
 struct Beyond {
     hit: Option<Hit>,
@@ -133,7 +126,7 @@ fn look(
         let passed = (from.origin - ray.origin).dot(ray.direction) / ray.direction.length_squared();
         let hit = nearest_visible(inputs, from, end - passed, ignored, random);
         let met = hit.map(|hit| surface_of(inputs.scene, hit)).filter(|met| {
-            asks && crossings < MOST_CROSSINGS
+            asks && crossings < DIRECT_CROSSINGS
                 && met.material.surface == DIELECTRIC
                 && !(lights_end_it && met.light != NO_LIGHT)
         });

@@ -2,12 +2,8 @@
 
 use glam::{DVec3, dvec3};
 
-use crate::layout::Material;
+use crate::layout::{LONGEST_WAVELENGTH, Material, SHORTEST_WAVELENGTH};
 use crate::random::Random;
-
-/// Wavelengths that paths have, nm.
-const SHORTEST: f64 = 400.0;
-const LONGEST: f64 = 700.0;
 
 /// The part of a wavelength in linear sRGB, whose mean over all is 1 for each channel.
 fn color_of(wavelength: f64) -> DVec3 {
@@ -43,7 +39,7 @@ pub(super) fn disperse(material: &mut Material, wavelength: &mut Option<f64>, ra
     let mut color = DVec3::ONE;
     let wavelength = *wavelength.get_or_insert_with(|| {
         let [u, ..] = random.next4();
-        let chosen = SHORTEST + (LONGEST - SHORTEST) * u;
+        let chosen = SHORTEST_WAVELENGTH + (LONGEST_WAVELENGTH - SHORTEST_WAVELENGTH) * u;
         color = color_of(chosen);
         chosen
     });
@@ -59,9 +55,9 @@ mod tests {
     #[test]
     fn all_wavelengths_together_are_white() {
         const COUNT: u32 = 100_000;
-        let step = (LONGEST - SHORTEST) / f64::from(COUNT);
+        let step = (LONGEST_WAVELENGTH - SHORTEST_WAVELENGTH) / f64::from(COUNT);
         let mean = (0..COUNT)
-            .map(|i| color_of(SHORTEST + (f64::from(i) + 0.5) * step))
+            .map(|i| color_of(SHORTEST_WAVELENGTH + (f64::from(i) + 0.5) * step))
             .sum::<DVec3>()
             / f64::from(COUNT);
         assert!((mean - DVec3::ONE).abs().max_element() < 1e-6, "{mean}");

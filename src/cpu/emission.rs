@@ -15,7 +15,7 @@ use super::texture::{apply_textures, share_there};
 use super::vector::rgb;
 use crate::alias::Choice;
 use crate::emission::{Table, light_of};
-use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
+use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, NARROW_CONE, POINT_LIGHT, SPOT_LIGHT, WIDE_CONE};
 use crate::random::Random;
 use crate::scene::Sphere;
 
@@ -65,9 +65,6 @@ pub(super) fn emit(inputs: &Inputs<'_>, random: &mut Random) -> Emission {
     );
     start.emission(inputs, index, 1.0 / f64::from(light.probability))
 }
-
-/// A sphere that is seen within less than this, sin² of its cone's angle, is worth aiming at from a matte surface.
-const NARROW_CONE: f64 = 0.25;
 
 /// From a matte surface outside of what the camera sees, half of the photons are aimed there. The direction in place of the
 /// `cosine`'s, and what the flux is to be weighed with: cosine over the density of both ways together, at most 2.
@@ -244,9 +241,6 @@ fn from_point(light: &Light, place: DVec2, u: DVec2, target: Option<Sphere>) -> 
         on_target: !by_intensity && extent == 0.0,
     }
 }
-
-/// Where a sphere takes up more than this of the directions, sin² of its cone's angle, they are chosen by their cosine.
-const WIDE_CONE: f64 = 0.5;
 
 /// From a point of a triangle, on its front or, if both sides shine, by `side` on either of them.
 fn from_triangle(

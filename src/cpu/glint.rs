@@ -9,14 +9,11 @@ use super::gloss::Reflector;
 use super::intersect::Ray;
 use super::light::{Arriving, arriving_from, choose_light, is_punctual, soft_light_along};
 use super::media::{Media, transmittance};
-use super::surface::{DIELECTRIC, Facing};
+use super::surface::Facing;
 use super::texture::nearest_visible;
 use super::{FAR, Inputs};
-use crate::layout::{DIRECTIONAL_LIGHT, Light, Material};
+use crate::layout::{DIELECTRIC, DIRECTIONAL_LIGHT, GLINT, Light, Material};
 use crate::random::Random;
-
-/// Of numbers that belong to it; no instance has that index.
-const GLINT: u32 = 0x676c_696e;
 
 /// By a ray to one of the lights or, where visible points are found once, to each. `reflector`: of what isn't glass.
 pub(super) fn glint(

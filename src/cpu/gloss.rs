@@ -7,10 +7,7 @@ use half::f16;
 
 use super::sampling::{basis, decode_direction, encode_direction};
 use super::vector::{rgb, with_word, word, xyz};
-use crate::layout::{Gloss, Material};
-
-/// Below this α a boundary is a mirror.
-pub const SMOOTH_ALPHA: f64 = 1e-3;
+use crate::layout::{COAT_F0, COATED, Gloss, Material, SMOOTH_ALPHA};
 
 pub(super) fn schlick(cosine: f64) -> f64 {
     (1.0 - cosine).clamp(0.0, 1.0).powi(5)
@@ -32,10 +29,6 @@ pub struct Reflector {
     /// What lies above both: how much of a dielectric's reflection it has.
     pub coat: f64,
 }
-
-/// Reflectance of a clear coat, whose index of refraction is 1.5, at normal incidence.
-const COATED: u32 = 0x8000; // of Gloss::rest
-pub(super) const COAT_F0: f64 = 0.04;
 
 /// What a coat lets through to what lies below.
 pub fn coat_passes(coat: f64, cosine: f64) -> f64 {

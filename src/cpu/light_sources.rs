@@ -7,10 +7,7 @@ use glam::DVec3;
 use super::Inputs;
 use super::vector::rgb;
 use crate::emission::light_of;
-use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, LightSource, TRIANGLE_LIGHT};
-
-/// The part of all choices among those that can bring anything that is made without knowing the point.
-const WITHOUT_POINT: f64 = 0.1;
+use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, LightSource, TRIANGLE_LIGHT, WITHOUT_POINT};
 
 /// Cosine of the difference of two angles, or 1 where the first is the smaller one.
 fn cos_beyond(cos_a: f64, cos_b: f64) -> f64 {

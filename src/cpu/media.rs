@@ -5,12 +5,10 @@ use glam::DVec3;
 use super::Inputs;
 use super::surface::Surface;
 use super::vector::rgb;
-use crate::layout::{Material, RANK};
+use crate::layout::{Material, RANK, VACUUM};
 
 /// A medium: its object's rank, then its material. [`VACUUM`] comes last.
 pub(super) type Medium = u32;
-
-const VACUUM: Medium = u32::MAX;
 
 /// Those that a ray is in, in order. Where several overlap, the first is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

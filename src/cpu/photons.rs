@@ -12,13 +12,12 @@ use super::intersect::{PlacedTriangle, Ray};
 use super::light::range_window;
 use super::media::{Media, transmittance};
 use super::sampling::{cosine_direction, encode_direction};
-use super::surface::{GLOSSY, MATTE, MIRROR};
 use super::texture::nearest_visible;
 use super::vector::{mean, rgb, with_word};
 use super::{Counts, Demand, FAR, Inputs};
 use crate::config::Direct;
 use crate::emission::PathValue;
-use crate::layout::{CAUSTIC, FOLLOWED_ALPHA, Material, Photon};
+use crate::layout::{CAUSTIC, FOLLOWED_ALPHA, GLOSSY_SURFACE, MATTE, MIRROR, Material, Photon};
 use crate::random::Random;
 
 /// Photon paths that are followed together.
@@ -143,7 +142,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         let (mixed, rest) = choose_part(&mut material, u[3]);
         u[3] = rest;
         let [choice, second, survival, _] = u;
-        let scatters = |material: &Material| [MATTE, GLOSSY].contains(&material.surface);
+        let scatters = |material: &Material| [MATTE, GLOSSY_SURFACE].contains(&material.surface);
         let wide_coat = material.coat > 0.0 && f64::from(material.coat_roughness).powi(2) >= FOLLOWED_ALPHA;
         let mut landing = path.flux;
         if mixed || wide_coat || scatters(&material) {
@@ -187,7 +186,7 @@ fn follow(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Phot
         let (direction, flux) = if scatters(&material) {
             // Drawn around the geometric normal, the outgoing direction needs no second correction.
             let cosine = cosine_direction(facing.geometric_normal, choice, second);
-            let (outgoing, weight, guided) = if kind == GLOSSY {
+            let (outgoing, weight, guided) = if kind == GLOSSY_SURFACE {
                 let (outgoing, weight) = facing.scatter(&Reflector::of_material(&material), incoming, u, cosine);
                 (outgoing, weight, 1.0)
             } else {

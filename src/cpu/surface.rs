@@ -5,21 +5,12 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use super::gloss::{COAT_F0, Reflector, coat_passes, schlick};
+use super::gloss::{Reflector, coat_passes, schlick};
 use super::intersect::{Hit, PlacedTriangle};
 use super::sampling::decode_direction;
 use super::vector::{rgb, word};
-use crate::layout::{Material, RANK, SMOOTH_SHADED, ShadingTriangle};
+use crate::layout::{COAT_F0, DIELECTRIC, GLOSSY_SURFACE, Material, RANK, ROUNDINGS, SMOOTH_SHADED, ShadingTriangle};
 use crate::scene::PackedScene;
-
-/// [`Material::surface`] of a Lambertian reflector.
-pub(super) const MATTE: u32 = 0;
-/// [`Material::surface`] of a perfect mirror.
-pub(super) const MIRROR: u32 = 1;
-/// [`Material::surface`] of glass.
-pub(super) const DIELECTRIC: u32 = 2;
-/// [`Material::surface`] of microfacets over a Lambertian base.
-pub(super) const GLOSSY: u32 = 3;
 
 /// A point of a triangle.
 #[derive(Clone, Copy)]
@@ -122,9 +113,6 @@ fn interpolated_normal(
     }
 }
 
-/// Parts of a triangle's coordinates by which rays leave it.
-pub(super) const ROUNDINGS: f64 = 16.0 / 16_777_216.0;
-
 /// Moves a ray's origin off its surface, to the side of `n`, by a bound of the rounding errors that positions and planes
 /// of triangles with corners up to `reach` have on a device: Pharr, Jakob and Humphreys, «Physically Based Rendering»,
 /// 3rd edition, 2016, section 3.9.5.
@@ -213,7 +201,7 @@ impl Facing {
         }
         self.shading_normal = n;
         *material = Material {
-            surface: GLOSSY,
+            surface: GLOSSY_SURFACE,
             base_color: [0.0; 3],
             metallic: 0.0,
             roughness: material.coat_roughness,

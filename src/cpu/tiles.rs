@@ -1,8 +1,7 @@
 //! The order of pixels in memory: `glsl/shared/visible_point.glsl`.
 
-use crate::config::TILE;
 pub use crate::config::pixel_of;
-use crate::layout::Settings;
+use crate::layout::{Settings, TILE};
 
 /// Slots for pixels: whole tiles.
 pub(super) fn pixel_slots(settings: &Settings) -> usize {

@@ -9,10 +9,7 @@ use rayon::prelude::*;
 use super::resolve::share_of;
 use super::vector::{from_two_float, from_two_floats, mean, to_two_float, to_two_floats, word, xyz};
 use super::{Counts, Seen};
-use crate::layout::{Coverage, Gathered, NO_OBJECT, Settings, Statistics, VisiblePoint};
-
-/// R² where it stops shrinking, and τ with it: far below what positions resolve, far above the smallest f32.
-const SMALLEST_RADIUS2: f64 = 1e-24;
+use crate::layout::{Coverage, Gathered, NO_OBJECT, SMALLEST_RADIUS2, Settings, Statistics, VisiblePoint};
 
 /// Statistics before the first photon, with R² in square render units; 0 where the first visible point sets it.
 pub fn reset(radius2: f32) -> Statistics {

@@ -7,9 +7,10 @@ use glam::{DVec3, Vec3};
 use super::strata::extent_of;
 use crate::config::MOST_TARGETS;
 use crate::layout::{
-    FOLLOWED_ALPHA, Light, Material, NO_OBJECT, POINT_LIGHT, SPOT_LIGHT, ShadingTriangle, VisiblePoint,
+    DIELECTRIC, FOLLOWED_ALPHA, GLOSSY_SURFACE, Light, MIRROR, Material, NO_OBJECT, POINT_LIGHT, SPOT_LIGHT,
+    ShadingTriangle, VisiblePoint,
 };
-use crate::scene::{DIELECTRIC, GLOSSY, MIRROR, PackedScene, Placement, Sphere};
+use crate::scene::{PackedScene, Placement, Sphere};
 
 /// Spheres around specular objects at the most.
 const MOST_SPECULAR: usize = 12;
@@ -93,7 +94,7 @@ pub(super) fn corners_of(triangle: &ShadingTriangle) -> [DVec3; 3] {
 fn is_specular(material: &Material) -> bool {
     let is_narrow = |roughness: f32| f64::from(roughness).powi(2) < FOLLOWED_ALPHA;
     [MIRROR, DIELECTRIC].contains(&material.surface)
-        || (material.surface == GLOSSY && is_narrow(material.roughness))
+        || (material.surface == GLOSSY_SURFACE && is_narrow(material.roughness))
         || (material.coat > 0.0 && is_narrow(material.coat_roughness))
 }
 

@@ -7,7 +7,8 @@ mod primitives;
 pub use photons::grid_sizes;
 pub use primitives::{PHOTON_PAIRS, POINT_PAIRS, Pairs, scan, sort};
 
-use crate::config::{GROUP, Sizes};
+use crate::config::Sizes;
+use crate::layout::GROUP;
 use crate::record::Recording;
 
 /// Records stages for buffers of these sizes.

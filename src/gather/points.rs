@@ -1,7 +1,8 @@
 //! Orders of visible points: what is recorded when they are new.
 
 use super::primitives::{POINT_PAIRS, scan, sort};
-use crate::config::{CURVE_BITS, GROUP, LLOYD_ROUNDS, NO_SLOT, Sizes};
+use crate::config::{LLOYD_ROUNDS, Sizes};
+use crate::layout::{CURVE_BITS, GROUP, NO_SLOT};
 use crate::record::Recording;
 use crate::shaders;
 use crate::stage::{BufferId, StageDesc};

@@ -21,6 +21,12 @@ impl From<usize> for Number {
     }
 }
 
+impl From<f32> for Number {
+    fn from(value: f32) -> Self {
+        Self::Float(value.into())
+    }
+}
+
 impl From<f64> for Number {
     fn from(value: f64) -> Self {
         Self::Float(value)
@@ -134,4 +140,107 @@ shared_constants! {
     pub const LANES_TOO_LONG: u32 = 2;
     /// Bit of [`super::StatusCounters::again`]: a visible point has more photons to test than loop iterations.
     pub const GATHERS_TOO_LONG: u32 = 4;
+
+    /// [`super::Material::surface`] of a Lambertian reflector.
+    pub const MATTE: u32 = 0;
+    /// [`super::Material::surface`] of a perfect mirror.
+    pub const MIRROR: u32 = 1;
+    /// [`super::Material::surface`] of a dielectric.
+    pub const DIELECTRIC: u32 = 2;
+    /// [`super::Material::surface`] of microfacets over a Lambertian base.
+    pub const GLOSSY_SURFACE: u32 = 3;
+
+    /// No medium: what a set of four has where it has fewer. It comes last.
+    pub const VACUUM: u32 = u32::MAX;
+
+    /// In [`super::Gloss::rest`], the sign of α: whether the material is coated.
+    pub const COATED: u32 = 0x8000;
+
+    /// Pixels of a tile's side: visible points lie in memory tile by tile.
+    pub const TILE: u32 = 8;
+    /// Visible points of a workgroup of the paper's orders: the workgroup size of `gather_*.comp`, and a cluster's run.
+    pub const GROUP: u32 = 64;
+    /// What an order of visible points has at a filler's place.
+    pub const NO_SLOT: u32 = u32::MAX;
+    /// Bits of a key along the space-filling curve of `point_curve.comp`, as many of each coordinate.
+    pub const CURVE_BITS: u32 = 18;
+    /// log2 of the entries of the table of what visible points want.
+    pub const DEMAND_BITS: u32 = 18;
+    /// Cells of that table are so many times larger than those of the gather's grid.
+    pub const COARSENING: f32 = 3.0;
+    /// Bit of a slot's number of tested photons: it had its turn.
+    pub const GATHERED_FOR: u32 = 1 << 31;
+
+    /// Cell size over R, of a grid, where all radii are alike. Measured, see docs/gather.md.
+    pub const CELLS_TO_RADIUS: f32 = 1.5;
+    /// Smallest cell size, render units. Positions resolve 6e-8: finer cells would gain nothing, and a visible point would reach
+    /// too many of them.
+    pub const SMALLEST_CELL: f32 = 1.0 / 1_048_576.0;
+    /// Cells that the largest radius of a shell may span: the few points in the dark that have it must not hold up the rest. It
+    /// holds so few photons that cells of that size are nearly empty.
+    pub const MOST_CELLS: f32 = 8.0;
+
+    /// Where random numbers come from: `config::Sampler`.
+    pub const SOBOL: u32 = 0;
+    /// Likewise.
+    pub const INDEPENDENT: u32 = 1;
+    /// Likewise.
+    pub const CONGRUENTIAL: u32 = 2;
+    /// Sequences of random numbers of low discrepancy that iterations take turns with: iteration i has the next numbers of
+    /// sequence i mod 4. They are independent of each other, so that their spread tells the picture's error
+    /// (`estimate`), and those of pixels go on through the whole render, so that each converges nearly as fast as one
+    /// for all would.
+    pub const SEQUENCES: u32 = 4;
+    /// Mixed into the seed, so that kinds of paths don't draw the same numbers: `random::PathKind`.
+    pub const CAMERA_PATH: u32 = 0x6361_6d65;
+    /// Likewise.
+    pub const PHOTON_PATH: u32 = 0x7068_6f74;
+    /// Likewise.
+    pub const LIGHT_SAMPLE: u32 = 0x6c69_6768;
+    /// Likewise.
+    pub const COVERAGE_SAMPLE: u32 = 0x636f_7665;
+    /// Of a path's numbers that belong to a glint; no instance has that index.
+    pub const GLINT: u32 = 0x676c_696e;
+
+    /// Parts of a triangle's coordinates by which rays leave it.
+    pub const ROUNDINGS: f64 = 16.0 / 16_777_216.0;
+    /// Cosine of the angle between planes up to which faces can lie on each other over more than a line.
+    pub const PARALLEL: f64 = 0.99;
+    /// A shadow ray ends this part of its length before the light, whose neighbours its rounded end may meet otherwise.
+    pub const ENDS_BEFORE: f64 = 16.0 / 16_777_216.0;
+
+    /// Below this α a boundary is a mirror.
+    pub const SMOOTH_ALPHA: f64 = 1e-3;
+    /// Reflectance of a clear coat, whose index of refraction is 1.5, at normal incidence.
+    pub const COAT_F0: f64 = 0.04;
+    /// Wavelengths that paths have, nm: the shortest.
+    pub const SHORTEST_WAVELENGTH: f64 = 400.0;
+    /// The longest.
+    pub const LONGEST_WAVELENGTH: f64 = 700.0;
+
+    /// A sphere that is seen within less than this, sin² of its cone's angle, is worth aiming at from a matte surface.
+    pub const NARROW_CONE: f64 = 0.25;
+    /// Where a sphere takes up more than this of the directions, sin² of its cone's angle, they are chosen by their cosine.
+    pub const WIDE_CONE: f64 = 0.5;
+    /// The part of all choices among sources that can bring anything that is made without knowing the point: what is before a
+    /// bright one isn't known.
+    pub const WITHOUT_POINT: f64 = 0.1;
+
+    /// Glass surfaces that are crossed on the way to a light at the most.
+    pub const DIRECT_CROSSINGS: u32 = 8;
+    /// Photons from which on a point asks for what lies behind glass in the first of [`ASKS_EVERY`] iterations alone.
+    pub const SEASONED: u32 = 16;
+    /// See [`SEASONED`].
+    pub const ASKS_EVERY: u32 = 32;
+    /// What an iteration counts for in a disc's coverage, whatever its points.
+    pub const COVERAGE_WHOLE: u32 = 16;
+    /// A disc that has been covered in so many iterations, and wholly, is asked for in every eighth one alone, as its neighbours
+    /// are: discs only shrink.
+    pub const COVERAGE_TRUSTED: u32 = 4;
+    /// Surfaces that are crossed on the way to a point of a disc at the most.
+    pub const COVERAGE_CROSSINGS: u32 = 4;
+
+    /// R² where it stops shrinking, and τ with it: far below what positions resolve, far above the smallest f32. With an α next
+    /// to 0 it takes eq. 2 a few photons to get there; from then on their density is that at this radius.
+    pub const SMALLEST_RADIUS2: f64 = 1e-24;
 }

@@ -7,16 +7,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::Placement;
-use super::features::DIELECTRIC;
 use crate::layout::{
-    BACK_EMITS, BACKED, BvhRecord, COINCIDENT, Instance, LEAF, Material, OPAQUE, PLACEMENT_RECORD, ShadingTriangle,
-    TOUCHED,
+    BACK_EMITS, BACKED, BvhRecord, COINCIDENT, DIELECTRIC, Instance, LEAF, Material, OPAQUE, PARALLEL,
+    PLACEMENT_RECORD, ROUNDINGS, ShadingTriangle, TOUCHED,
 };
 
-/// As `offset_origin` in `glsl/shared/scene.glsl`: rays leave surfaces by that much of their corners' coordinates.
-const ROUNDINGS: f32 = 16.0 / 16_777_216.0;
-/// Cosine of the angle between planes up to which faces can lie on each other over more than a line.
-const PARALLEL: f32 = 0.99;
 /// Triangles of all instances of a primitive that are looked at. Where there are more, dielectrics are all taken to touch
 /// something, which costs the kernels a look, and others to touch nothing.
 const MOST_PLACED: usize = 1 << 18;
@@ -111,7 +106,7 @@ impl Place {
         Self {
             placement,
             object: instance.object,
-            reach: 2.0 * ROUNDINGS * placement.reach().element_sum(),
+            reach: 2.0 * ROUNDINGS as f32 * placement.reach().element_sum(),
         }
     }
 
@@ -151,7 +146,7 @@ impl Face {
         let corners = corners.map(|corner| place.map_or(corner, |place| place.placement.point(corner)));
         let [a, b, c] = corners;
         let largest = a.abs().max(b.abs()).max(c.abs());
-        let reach = 2.0 * ROUNDINGS * largest.element_sum();
+        let reach = 2.0 * ROUNDINGS as f32 * largest.element_sum();
         let normal = (b - a).as_dvec3().cross((c - a).as_dvec3()).normalize().as_vec3();
         Self {
             corners,
@@ -247,7 +242,7 @@ impl Face {
         let same_object = self.object == other.object;
         let see_through = scene.materials[materials[0] as usize].alpha_mode != OPAQUE;
         let alike = same_object && cosine > 0.0 && !see_through;
-        if cosine.abs() <= PARALLEL || alike || !self.touches(other) {
+        if cosine.abs() <= PARALLEL as f32 || alike || !self.touches(other) {
             return 0;
         }
         let [own, others] = materials.map(|material| &scene.materials[material as usize]);

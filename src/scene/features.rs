@@ -1,16 +1,10 @@
 //! What of the renderer a scene needs: the kernels are specialised for it and have no code for the rest.
 
 use crate::layout::{
-    BACK_HIDDEN, BACKED, COINCIDENT, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, NO_TEXTURE, POINT_LIGHT,
-    SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED_TRIANGLE, TOUCHED, TRIANGLE_LIGHT,
+    BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, GLOSSY_SURFACE, Light, MIRROR,
+    Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED_TRIANGLE,
+    TOUCHED, TRIANGLE_LIGHT,
 };
-
-/// [`Material::surface`] of a mirror.
-pub(crate) const MIRROR: u32 = 1;
-/// [`Material::surface`] of a dielectric.
-pub(crate) const DIELECTRIC: u32 = 2;
-/// [`Material::surface`] of what reflects as microfacets do, over a Lambertian base.
-pub(crate) const GLOSSY: u32 = 3;
 
 /// Declares the features, each with its constant in the kernels.
 macro_rules! features {
@@ -106,7 +100,7 @@ impl SceneFeatures {
             let mixed = glass && !(clear && material.metallic == 0.0);
             features.mirror |= material.surface == MIRROR;
             features.dielectric |= glass;
-            features.glossy |= material.surface == GLOSSY || mixed || material.coat > 0.0;
+            features.glossy |= material.surface == GLOSSY_SURFACE || mixed || material.coat > 0.0;
             features.rough_glass |= glass && material.roughness > 0.0;
             features.thin_walls |= glass && material.thin != 0;
             features.partly_clear |= mixed;

@@ -4,10 +4,8 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::nesting::{Nesting, is_solid};
 use super::{Object, Scene};
-use crate::layout::{Light, POINT_LIGHT, RANK, SPOT_LIGHT, TRIANGLE_LIGHT};
+use crate::layout::{Light, POINT_LIGHT, RANK, SPOT_LIGHT, TRIANGLE_LIGHT, VACUUM};
 
-/// No medium: what a set of four has where it has fewer. See `glsl/shared/media.glsl`.
-const VACUUM: u32 = u32::MAX;
 /// In no medium.
 pub(crate) const IN_VACUUM: [u32; 4] = [VACUUM; 4];
 

@@ -61,7 +61,6 @@ mod variants;
 
 pub use budget::MEMORY_LIMIT;
 pub use features::SceneFeatures;
-pub(crate) use features::{DIELECTRIC, GLOSSY, MIRROR};
 pub(crate) use immersion::IN_VACUUM;
 pub use immersion::Immersion;
 pub use light_sources::MOST_SOURCES;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3, Vec4};
 
-use super::features::{DIELECTRIC, GLOSSY, MIRROR, SceneFeatures};
+use super::features::SceneFeatures;
 use super::immersion::{IN_VACUUM, Immersion};
 use super::material::normal_reflectance;
 use super::near_lights::NearLights;
@@ -16,9 +16,9 @@ use super::{
     environment, light_bounds, light_table,
 };
 use crate::layout::{
-    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, HavelTriangle, Instance, Light, LightSource, MASK, MIRRORED,
-    Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, RANK, SEE_THROUGH, SMOOTH_SHADED, SPECULAR_CHANGED,
-    ShadingTriangle, TEXTURED_TRIANGLE, TRIANGLE_LIGHT, TextureLookup,
+    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, DIELECTRIC, GLOSSY_SURFACE, HavelTriangle, Instance, Light,
+    LightSource, MASK, MIRROR, MIRRORED, Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, RANK, SEE_THROUGH,
+    SMOOTH_SHADED, SPECULAR_CHANGED, ShadingTriangle, TEXTURED_TRIANGLE, TRIANGLE_LIGHT, TextureLookup,
 };
 
 /// Sources of light of which each is asked by a ray of its own; of more one is chosen.
@@ -332,7 +332,7 @@ fn material(material: &super::Material) -> Material {
         Surface::Matte => (0, None, Gloss::default()),
         Surface::Mirror => (MIRROR, None, Gloss::default()),
         Surface::Dielectric(glass) => (DIELECTRIC, Some(glass), glass.gloss),
-        Surface::Glossy(gloss) => (GLOSSY, None, gloss),
+        Surface::Glossy(gloss) => (GLOSSY_SURFACE, None, gloss),
     };
     let inside = glass.unwrap_or(Dielectric::clear(1.0));
     let textures = &material.textures;

@@ -8,7 +8,7 @@ use ppm_vk::config::{Accel, EmissionChoice, RenderConfig, TriangleTest};
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
-use ppm_vk::layout::{MIRRORED, Settings, ShadingTriangle, TOUCHED};
+use ppm_vk::layout::{DIELECTRIC, MIRRORED, Settings, ShadingTriangle, TOUCHED};
 use ppm_vk::metrics::compare;
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::scene::{PackedScene, Placement, Scene};
@@ -259,7 +259,7 @@ fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
             &scene.shading_triangles[instance.first_triangle as usize..][..instance.triangle_count as usize];
         let placement = Placement { rows: instance.rows };
         let height = |t: &ShadingTriangle| placement.point(xyz(t.p0).as_vec3()).y;
-        let is_glass = scene.materials[triangles[0].material as usize].surface == 2;
+        let is_glass = scene.materials[triangles[0].material as usize].surface == DIELECTRIC;
         is_glass.then(|| triangles.iter().map(height).fold(f32::INFINITY, f32::min))
     });
     let bottoms: Vec<f32> = bottoms.collect();
