@@ -1,5 +1,6 @@
 //! What the user asked for, and every buffer size and group count that follows from it.
 
+pub mod ranges;
 mod sizes;
 mod tiles;
 
@@ -60,7 +61,7 @@ pub enum EmissionChoice {
 
 impl EmissionChoice {
     /// What an estimator uses where the user doesn't say.
-    pub fn of(estimator: Estimator) -> Self {
+    pub const fn of(estimator: Estimator) -> Self {
         match estimator {
             Estimator::Sppm => Self::Aimed,
             Estimator::Ppm => Self::Power,
@@ -82,7 +83,7 @@ pub enum Sampler {
 
 impl Sampler {
     /// What an estimator uses where the user doesn't say: the paper's has independent numbers.
-    pub fn of(estimator: Estimator) -> Self {
+    pub const fn of(estimator: Estimator) -> Self {
         match estimator {
             Estimator::Sppm => Self::Sobol,
             Estimator::Ppm => Self::Independent,
@@ -130,24 +131,7 @@ pub struct RenderConfig {
 
 impl Default for RenderConfig {
     fn default() -> Self {
-        Self {
-            resolution: [1280, 720],
-            photons: 100_000,
-            estimator: Estimator::Sppm,
-            direct: Direct::Light,
-            alpha: 2.0 / 3.0,
-            radius: None,
-            gather: None,
-            cell_photons: None,
-            accel: Accel::Bvh,
-            triangle_test: TriangleTest::Watertight,
-            max_depth: 64,
-            drop_unwanted: true,
-            emission: EmissionChoice::Aimed,
-            aims_anyway: false,
-            sampler: Sampler::Sobol,
-            seed: 0,
-        }
+        Self::DEFAULT
     }
 }
 
@@ -163,40 +147,61 @@ pub fn iterations_of(sequence: u32, iterations: u32) -> u32 {
 const MOST_CAMERA_PATHS: u32 = 8;
 
 impl RenderConfig {
+    /// What the user gets who says nothing; the arguments' defaults are these.
+    pub const DEFAULT: Self = Self {
+        resolution: [1280, 720],
+        photons: 100_000,
+        estimator: Estimator::Sppm,
+        direct: Direct::Light,
+        alpha: 2.0 / 3.0,
+        radius: None,
+        gather: None,
+        cell_photons: None,
+        accel: Accel::Bvh,
+        triangle_test: TriangleTest::Watertight,
+        max_depth: 64,
+        drop_unwanted: true,
+        emission: EmissionChoice::of(Estimator::Sppm),
+        aims_anyway: false,
+        sampler: Sampler::of(Estimator::Sppm),
+        seed: 0,
+    };
+
     /// Checks every range.
     ///
     /// # Errors
     /// The first setting outside its range.
     pub fn check(&self) -> Result<()> {
         let [width, height] = self.resolution;
-        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-            return Err(Error::Config(format!(
-                "--resolution {width}x{height}: each side must lie between 1 and {MAX_SIDE}"
-            )));
-        }
-        if !(self.alpha > 0.0 && self.alpha < 1.0) {
-            return Err(Error::Config(format!(
-                "--alpha {}: must lie between 0 and 1, both excluded",
-                self.alpha
-            )));
-        }
-        if let Some(radius) = self.radius
-            && !(radius > 0.0 && radius.is_finite())
-        {
-            return Err(Error::Config(format!("--radius {radius}: must be above 0")));
-        }
-        if self.photons == 0 {
-            return Err(Error::Config(
-                "--photons 0: at least one photon path is needed".to_owned(),
-            ));
-        }
-        if self.cell_photons == Some(0) {
-            return Err(Error::Config(
-                "--cell-photons 0: a cell has to hold at least one photon".to_owned(),
-            ));
-        }
-        if self.max_depth == 0 {
-            return Err(Error::Config("--max-depth 0: at least one bounce is needed".to_owned()));
+        let optional = |value: Option<String>| value.unwrap_or_default();
+        let settings = [
+            (
+                "resolution",
+                format!("{width}x{height}"),
+                ranges::resolution(self.resolution).err(),
+            ),
+            ("alpha", self.alpha.to_string(), ranges::alpha(self.alpha).err()),
+            (
+                "radius",
+                optional(self.radius.map(|radius| radius.to_string())),
+                self.radius.and_then(|radius| ranges::positive(radius).err()),
+            ),
+            ("photons", self.photons.to_string(), ranges::count(self.photons).err()),
+            (
+                "cell-photons",
+                optional(self.cell_photons.map(|count| count.to_string())),
+                self.cell_photons.and_then(|count| ranges::count(count).err()),
+            ),
+            (
+                "max-depth",
+                self.max_depth.to_string(),
+                ranges::count(self.max_depth).err(),
+            ),
+        ];
+        for (flag, value, wrong) in settings {
+            if let Some(wrong) = wrong {
+                return Err(Error::Config(format!("--{flag} {value}: {wrong}")));
+            }
         }
         Ok(())
     }

@@ -10,7 +10,7 @@ use super::compare::Compare;
 use super::converge::ConvergeArguments;
 use super::outputs::named;
 use super::scene::SceneArguments;
-use crate::config::{Accel, Direct, EmissionChoice, Estimator, Sampler, TriangleTest};
+use crate::config::{Accel, Direct, EmissionChoice, Estimator, RenderConfig, Sampler, TriangleTest, ranges};
 use crate::gather;
 
 /// Parts of the picture's larger side that the film is moved by at the most.
@@ -116,7 +116,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
     /// Stop after so many iterations [default: 64 if there is neither --time nor --target-error].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = count)]
     pub iterations: Option<u32>,
     /// Stop after so many seconds.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
@@ -125,16 +125,16 @@ pub struct RenderArguments {
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = positive)]
     pub target_error: Option<f64>,
     /// Photon paths emitted in an iteration.
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.photons, value_parser = count)]
     pub photons: u32,
     /// New visible points each iteration, or the same ones all the time as in the paper.
-    #[arg(long, value_enum, default_value_t = Estimator::Sppm)]
+    #[arg(long, value_enum, default_value_t = RenderConfig::DEFAULT.estimator)]
     pub estimator: Estimator,
     /// Direct light by sampling the lights, or by photons as in the paper.
-    #[arg(long, value_enum, default_value_t = Direct::Light)]
+    #[arg(long, value_enum, default_value_t = RenderConfig::DEFAULT.direct)]
     pub direct: Direct,
     /// Eq. 2's α: the part of an iteration's photons that a visible point keeps.
-    #[arg(long, value_name = "A", default_value_t = 2.0 / 3.0, allow_negative_numbers = true, value_parser = alpha)]
+    #[arg(long, value_name = "A", default_value_t = RenderConfig::DEFAULT.alpha, allow_negative_numbers = true, value_parser = alpha)]
     pub alpha: f32,
     /// Initial radius in scene units [default: from the photons' density, printed].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
@@ -144,16 +144,16 @@ pub struct RenderArguments {
     pub gather: Option<usize>,
     /// Photons that a cell of --gather cluster-grid holds at the most, as in the paper: more are lost, and counted
     /// [default: cells hold all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = count)]
     pub cell_photons: Option<u32>,
     /// How rays meet triangles.
-    #[arg(long, value_enum, default_value_t = Accel::Bvh)]
+    #[arg(long, value_enum, default_value_t = RenderConfig::DEFAULT.accel)]
     pub accel: Accel,
     /// How a ray is tested against a triangle: havel is the paper's test with precomputed planes.
-    #[arg(long, value_enum, default_value_t = TriangleTest::Watertight)]
+    #[arg(long, value_enum, default_value_t = RenderConfig::DEFAULT.triangle_test)]
     pub triangle_test: TriangleTest,
     /// Bounces of a camera or photon path at the most.
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.max_depth, value_parser = count)]
     pub max_depth: u32,
     /// Where photon paths start: learned from what the picture needs, or by the lights' power as in the paper
     /// [default: aimed, with --estimator ppm power].
@@ -164,7 +164,7 @@ pub struct RenderArguments {
     pub sampler: Option<Sampler>,
     /// Seed: the same one on the same device gives the same picture, bit for bit (but for the paper's gathers that order
     /// photons by atomic counters).
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.seed)]
     pub seed: u32,
     /// Vulkan device, by a part of its name or its index [default: the best].
     #[arg(long, value_name = "NAME|INDEX")]
@@ -190,11 +190,15 @@ pub fn resolution(text: &str) -> Result<[u32; 2], String> {
     let parsed = text
         .split_once(['x', 'X'])
         .and_then(|(width, height)| Some([width.parse::<u32>().ok()?, height.parse::<u32>().ok()?]));
-    match parsed {
-        Some(sides) if sides.iter().all(|side| (1..=crate::config::MAX_SIDE).contains(side)) => Ok(sides),
-        Some(_) => Err(format!("each side must lie between 1 and {}", crate::config::MAX_SIDE)),
-        None => Err("expected WIDTHxHEIGHT, such as 1280x720".to_owned()),
-    }
+    parsed.map_or_else(
+        || Err("expected WIDTHxHEIGHT, such as 1280x720".to_owned()),
+        ranges::resolution,
+    )
+}
+
+pub fn count(text: &str) -> Result<u32, String> {
+    let whole = |_| format!("expected a whole number up to {}", u32::MAX);
+    ranges::count(text.parse().map_err(whole)?)
 }
 
 fn shift(text: &str) -> Result<[f32; 2], String> {
@@ -213,21 +217,11 @@ pub fn number(text: &str) -> Result<f64, String> {
 }
 
 fn alpha(text: &str) -> Result<f32, String> {
-    let alpha = number(text)? as f32;
-    if alpha > 0.0 && alpha < 1.0 {
-        Ok(alpha)
-    } else {
-        Err("must lie between 0 and 1, both excluded".to_owned())
-    }
+    ranges::alpha(number(text)? as f32)
 }
 
 pub fn positive(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err("must be above 0 and finite".to_owned())
-    }
+    ranges::positive(number(text)?)
 }
 
 pub fn seconds(text: &str) -> Result<Duration, String> {

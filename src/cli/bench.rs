@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory};
 
-use super::args::{Arguments, gather_method, png_file, positive, resolution};
+use super::args::{Arguments, count, gather_method, png_file, positive, resolution};
 use super::outputs::{all, check_outputs, named};
 use super::scene::{SceneArguments, say_remarks};
 use super::{Outcome, print};
@@ -34,7 +34,7 @@ pub struct BenchGather {
     #[arg(long, value_name = "WxH", value_parser = resolution)]
     resolution: Vec<[u32; 2]>,
     /// Photon paths.
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.photons, value_parser = count)]
     photons: u32,
     /// Radius in scene units [default: from the photons' density].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
@@ -43,10 +43,10 @@ pub struct BenchGather {
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = gather_method)]
     methods: Vec<usize>,
     /// Photons that a cell of cluster-grid holds at the most, as in the paper [default: all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = count)]
     cell_photons: Option<u32>,
     /// How often each method runs; of its times the median counts.
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = count)]
     repeats: u32,
     /// Vary photons, visible points and radius instead.
     #[arg(long)]
@@ -142,7 +142,7 @@ pub struct BenchRandom {
     #[arg(long, value_name = "N", default_value_t = 1_000_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     numbers: u64,
     /// Seed of the numbers.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.seed)]
     seed: u32,
     /// As JSON.
     #[arg(long)]
@@ -177,10 +177,10 @@ pub struct BenchFeatures {
     #[arg(long, value_name = "WxH", default_value = "256x256", value_parser = resolution)]
     resolution: [u32; 2],
     /// Photon paths emitted in an iteration.
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.photons, value_parser = count)]
     photons: u32,
     /// Iterations of each; medians count.
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = count)]
     repeats: u32,
     /// Vulkan device, by a part of its name or its index [default: the best].
     #[arg(long, value_name = "NAME|INDEX")]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 
-use super::args::seconds;
+use super::args::{count, seconds};
 use super::outputs::{all, check_outputs, named};
 use super::scene::{SceneArguments, say_remarks};
 use super::{Outcome, interrupt, print};
@@ -33,10 +33,10 @@ pub struct ConvergeArguments {
     #[arg(long, value_enum)]
     vary: Option<Vary>,
     /// Photon paths emitted in an iteration.
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.photons, value_parser = count)]
     photons: u32,
     /// Seed; not the reference's, if this program made it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.seed)]
     seed: u32,
     /// Write the curves as comma-separated values.
     #[arg(long, value_name = "FILE", value_parser = named("csv"))]

@@ -25,7 +25,7 @@ use crate::report::Subject;
 use crate::scene::{Camera, PackedScene};
 
 /// Width of a picture without --resolution.
-const DEFAULT_WIDTH: u32 = 1280;
+const DEFAULT_WIDTH: u32 = RenderConfig::DEFAULT.resolution[0];
 /// Aspect ratio where neither the user nor the camera gives one.
 const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
 /// Iterations where the user gives neither them nor a time.

@@ -1,0 +1,36 @@
+//! The values that settings may have, for arguments and for [`RenderConfig::check`](super::RenderConfig::check) alike. Each
+//! gives the value back, or says what it must be.
+
+use super::MAX_SIDE;
+
+/// The value, or what it must be.
+pub type Checked<T> = Result<T, String>;
+
+fn checked<T>(value: T, fits: bool, range: impl FnOnce() -> String) -> Checked<T> {
+    if fits { Ok(value) } else { Err(range()) }
+}
+
+/// Pixels, width and height.
+pub fn resolution(sides: [u32; 2]) -> Checked<[u32; 2]> {
+    let fits = sides.iter().all(|side| (1..=MAX_SIDE).contains(side));
+    checked(sides, fits, || format!("each side must lie between 1 and {MAX_SIDE}"))
+}
+
+/// How many there are of what there must be at least one of.
+pub fn count(count: u32) -> Checked<u32> {
+    checked(count, count > 0, || "must be at least 1".to_owned())
+}
+
+/// Eq. 2's α.
+pub fn alpha(alpha: f32) -> Checked<f32> {
+    checked(alpha, alpha > 0.0 && alpha < 1.0, || {
+        "must lie between 0 and 1, both excluded".to_owned()
+    })
+}
+
+/// A length, or another quantity that has no sense at 0.
+pub fn positive(value: f64) -> Checked<f64> {
+    checked(value, value > 0.0 && value.is_finite(), || {
+        "must be above 0 and finite".to_owned()
+    })
+}
