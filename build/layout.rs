@@ -3,17 +3,17 @@
 use std::fmt::Write as _;
 
 #[path = "../src/layout/mod.rs"]
-#[allow(dead_code, clippy::duplicate_mod)]
+#[allow(dead_code, unused_imports, reason = "the program uses the rest")]
 mod shared;
 
 use shared::constants::{self, Number};
-use shared::{FieldLayout, LAYOUTS, Layout, Scalar, Shape};
+use shared::{FieldLayout, Layout, Scalar, Shape, layouts};
 
 /// The struct that kernels see as a uniform block instead.
 const UNIFORM: &str = "Settings";
 
 fn structs() -> impl Iterator<Item = &'static Layout> {
-    LAYOUTS.iter().filter(|layout| layout.name != UNIFORM)
+    layouts().filter(|layout| layout.name != UNIFORM)
 }
 
 /// Files that [`include`] has.
@@ -57,7 +57,7 @@ fn constants_and_structs() -> String {
 }
 
 fn settings() -> String {
-    let layout = LAYOUTS.iter().find(|layout| layout.name == UNIFORM).expect("settings");
+    let layout = layouts().find(|layout| layout.name == UNIFORM).expect("settings");
     format!(
         "#include \"layout.glsl\"\nlayout(std140) uniform {UNIFORM} {{\n{}}} settings;\n",
         members(layout)

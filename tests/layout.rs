@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use ppm_vk::layout::LAYOUTS;
+use ppm_vk::layout::layouts;
 use ppm_vk::shaders::{ALL, STRUCTS};
 use ppm_vk::stage::Access;
 
@@ -13,7 +13,7 @@ fn every_struct_has_the_same_fields_in_rust_and_glsl() {
         .flat_map(|shader| shader.bindings.iter().map(|binding| (shader.name, &binding.element)));
     let mut compared = BTreeSet::new();
     for (place, glsl) in bound.chain(STRUCTS.iter().map(|glsl| ("the build's probe", glsl))) {
-        let Some(rust) = LAYOUTS.iter().find(|layout| layout.name == glsl.name) else {
+        let Some(rust) = layouts().find(|layout| layout.name == glsl.name) else {
             continue;
         };
         let expected: Vec<_> = rust
@@ -33,7 +33,7 @@ fn every_struct_has_the_same_fields_in_rust_and_glsl() {
         );
         compared.insert(glsl.name);
     }
-    let all: BTreeSet<_> = LAYOUTS.iter().map(|layout| layout.name).collect();
+    let all: BTreeSet<_> = layouts().map(|layout| layout.name).collect();
     assert_eq!(compared, all, "structs compared (left) aren't those of layout (right)");
 }
 
@@ -44,7 +44,7 @@ fn every_block_of_structs_has_a_rust_struct() {
             // Blocks of plain numbers are named like their buffer, structs otherwise.
             let name = binding.element.name;
             let is_buffer = name == format!("{:?}", binding.buffer) && binding.access != Access::Uniform;
-            let known = LAYOUTS.iter().any(|rust| rust.name == name);
+            let known = layouts().any(|rust| rust.name == name);
             assert!(
                 known || is_buffer || binding.access == Access::Texels,
                 "stage {} binds {:?} of struct {name}, which layout.rs doesn't have",

@@ -1,4 +1,4 @@
-//! What types fields can have, as kernels see them.
+//! How structs and their fields are laid out, and what types fields can have, as kernels see them.
 
 /// What a number is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,4 +60,26 @@ impl Shared for f32 {
 
 impl<T: Shared, const N: usize> Shared for [T; N] {
     const SHAPE: Shape = T::SHAPE.many(N);
+}
+
+/// A field of a struct.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FieldLayout {
+    /// Its name.
+    pub name: &'static str,
+    /// Bytes from the struct's beginning.
+    pub offset: usize,
+    /// Its type.
+    pub shape: Shape,
+}
+
+/// A struct.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Its name.
+    pub name: &'static str,
+    /// Bytes.
+    pub size: usize,
+    /// In order.
+    pub fields: &'static [FieldLayout],
 }

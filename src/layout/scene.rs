@@ -1,0 +1,271 @@
+//! What kernels have of a scene.
+
+use bytemuck::{Pod, Zeroable};
+
+#[allow(unused_imports, reason = "most are linked by the documentation alone")]
+use super::constants::*;
+use super::shape::{FieldLayout, Layout, Shared};
+
+device_structs! {
+    /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf, or one of the two of an
+    /// instance. Records refer to each other by index; a reference with [`LEAF`] set is to the first record of a leaf, whose
+    /// others follow it. An instance is a leaf of its own.
+    pub struct BvhRecord: 64 {
+        /// Node: corner of the left box; w: u32 bits, the left reference. Triangle: its first corner. Instance: first row of
+        /// the map to render space, or back.
+        pub row0: [f32; 4],
+        /// Node: the left box's other corner. Triangle: its second corner. Instance: second row.
+        pub row1: [f32; 4],
+        /// Node: corner of the right box; w: u32 bits, the right reference. Triangle: its third corner. Instance: third row.
+        pub row2: [f32; 4],
+        /// Node: the right box's other corner. Leaf: u32 bits: x: index of the triangle or instance, or root of the instance's
+        /// hierarchy; y: 1 for a leaf's last; z: 0, [`PLACEMENT_RECORD`] or [`RAY_RECORD`]. f32: w: of the latter, what the
+        /// hierarchy's boxes are widened by.
+        pub row3: [f32; 4],
+    }
+
+    /// Where shared triangles are put.
+    pub struct Instance: 64 {
+        /// Rows of the map to render space.
+        pub rows: [[f32; 4]; 3],
+        /// Index of its object.
+        pub object: u32,
+        /// [`MIRRORED`], and the rank from bit [`RANK`] on.
+        pub flags: u32,
+        /// Index of its first triangle.
+        pub first_triangle: u32,
+        /// How many it has.
+        pub triangle_count: u32,
+    }
+
+    /// Havel and Herout's precomputed triangle.
+    pub struct HavelTriangle: 48 {
+        /// xyz: normal (not unit); w: its plane's offset.
+        pub n0: [f32; 4],
+        /// xyz, w: plane whose value is the barycentric coordinate u.
+        pub n1: [f32; 4],
+        /// xyz, w: plane whose value is the barycentric coordinate v.
+        pub n2: [f32; 4],
+    }
+
+    /// A triangle as shading needs it.
+    pub struct ShadingTriangle: 64 {
+        /// xyz: position; w: u32 bits, octahedral shading normal.
+        pub p0: [f32; 4],
+        /// Likewise.
+        pub p1: [f32; 4],
+        /// Likewise.
+        pub p2: [f32; 4],
+        /// Index of its object; what instances share has none.
+        pub object: u32,
+        /// Index of its material.
+        pub material: u32,
+        /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED_TRIANGLE`], [`SEE_THROUGH`], [`COINCIDENT`], [`BACKED`], and the rank from bit
+        /// [`RANK`] on; what instances share has none.
+        pub flags: u32,
+        /// Index of its light, the first of those of its parts, or [`NO_LIGHT`].
+        pub light: u32,
+    }
+
+    /// What the corner of a triangle has for textures.
+    pub struct Corner: 32 {
+        /// Coordinates of the first set.
+        pub first: [f32; 2],
+        /// Of the second set.
+        pub second: [f32; 2],
+        /// Factor of the base colour, linear RGBA, f16s.
+        pub color: [u32; 2],
+        /// Octahedral tangent.
+        pub tangent: u32,
+        /// 1 or −1 for the bitangent's side, 0 where there is no tangent.
+        pub bitangent: f32,
+    }
+
+    /// How a texture is looked up. A place is row · (u, v, 1), in widths and heights of the image.
+    pub struct TextureLookup: 48 {
+        /// To the place along the image's width.
+        pub row_u: [f32; 3],
+        /// Index of the image's first texel, which is the top left one: RGBA, a byte each.
+        pub first_texel: u32,
+        /// To the place along the image's height.
+        pub row_v: [f32; 3],
+        /// Width, and height in the upper half.
+        pub size: u32,
+        /// [`SECOND_SET`], [`SRGB`], [`NEAREST`], and the wraps at [`WRAP_U`] and [`WRAP_V`].
+        pub flags: u32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+        /// Zero.
+        pub padding2: u32,
+    }
+
+    /// A material. Textures are indices of [`TextureLookup`]s, or [`NO_TEXTURE`]; each is a factor.
+    pub struct Material: 160 {
+        /// Linear RGB albedo, reflectance or tint.
+        pub base_color: [f32; 3],
+        /// [`MATTE`], [`MIRROR`], [`DIELECTRIC`] or [`GLOSSY_SURFACE`].
+        pub surface: u32,
+        /// Emitted radiance, linear RGB.
+        pub emission: [f32; 3],
+        /// Index of refraction inside.
+        pub ior: f32,
+        /// [`BACK_EMITS`], [`BACK_HIDDEN`], [`SPECULAR_CHANGED`].
+        pub flags: u32,
+        /// How far the surface is a metal.
+        pub metallic: f32,
+        /// Of a glossy surface; its square is GGX's α.
+        pub roughness: f32,
+        /// Share of what is no metal that passes light, of a dielectric; the rest is glossy.
+        pub transmission: f32,
+        /// Reflectance at normal incidence of the glossy surface's dielectric part, linear RGB.
+        pub specular_f0: [f32; 3],
+        /// Its reflectance at grazing incidence.
+        pub specular_f90: f32,
+        /// Absorption coefficient inside of a dielectric, linear RGB, 1/length.
+        pub absorption: [f32; 3],
+        /// 1 for a dielectric that is a thin wall, without an inside.
+        pub thin: u32,
+        /// Of the base colour, its alpha with it.
+        pub color_texture: u32,
+        /// Roughness in green, how far it is a metal in blue.
+        pub metal_texture: u32,
+        /// Normals in the space of the tangent.
+        pub normal_texture: u32,
+        /// Of the emission.
+        pub emission_texture: u32,
+        /// In red.
+        pub transmission_texture: u32,
+        /// Of the reflectance at both angles, in alpha.
+        pub specular_texture: u32,
+        /// Of the reflectance at normal incidence.
+        pub specular_color_texture: u32,
+        /// How far the normals of their texture lean.
+        pub normal_scale: f32,
+        /// [`OPAQUE`], [`MASK`] or [`BLEND`].
+        pub alpha_mode: u32,
+        /// Of [`MASK`].
+        pub alpha_cutoff: f32,
+        /// Factor of alpha.
+        pub alpha: f32,
+        /// 20 over the Abbe number of a dielectric; 0: its index is that of every wavelength.
+        pub dispersion: f32,
+        /// How much of a clear coat lies above; 0: none.
+        pub coat: f32,
+        /// Its square is GGX's α of the coat.
+        pub coat_roughness: f32,
+        /// Of how much there is of the coat, in red.
+        pub coat_texture: u32,
+        /// Of its roughness, in green.
+        pub coat_roughness_texture: u32,
+        /// Its normals in the space of the tangent.
+        pub coat_normal_texture: u32,
+        /// How far those lean.
+        pub coat_normal_scale: f32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+    }
+
+    /// A light, and a cell of the alias table that chooses one. What its kind doesn't use is zero.
+    pub struct Light: 80 {
+        /// Triangle: its index.
+        pub triangle: u32,
+        /// Its probability, nearly in proportion to its flux.
+        pub probability: f32,
+        /// Area of the triangle, or of its part, or of the disc that a distant light's photons start from.
+        pub area: f32,
+        /// [`TRIANGLE_LIGHT`], [`POINT_LIGHT`], [`SPOT_LIGHT`], [`DIRECTIONAL_LIGHT`] or [`ENVIRONMENT_LIGHT`].
+        pub kind: u32,
+        /// Of the cell: the part of it that chooses this light.
+        pub accept: f32,
+        /// Of the cell: the light that the rest of it chooses.
+        pub alias: u32,
+        /// Probability of this light and those before it among the lights of its source ([`EmissionCell`]), a multiple of 2⁻²⁴.
+        pub cumulative: f32,
+        /// Point, spot: radius of a disc that looks at whom it lights, render units. Directional: 1 − cos of the angle between the
+        /// middle and the edge of what is seen of it. 0: none.
+        pub extent: f32,
+        /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB.
+        pub intensity: [f32; 3],
+        /// Spot: 1 − cos of the angle where it begins to fall off.
+        pub inner: f32,
+        /// Point, spot: where it is. Directional: centre of the disc. Triangle: which of its parts, each a light of its own, this one is:
+        /// column and row, and how many columns there are; all of it is 0, 0, 1. They follow each other row by row.
+        pub position: [f32; 3],
+        /// Spot: 1 − cos of the angle where it ends.
+        pub outer: f32,
+        /// Spot, directional: unit vector that it shines along.
+        pub direction: [f32; 3],
+        /// Point, spot: 1 over the distance that it reaches, 0 where it reaches any.
+        pub inverse_range: f32,
+    }
+
+    /// What a source of light can bring at the most: its lights' bounds in place and direction.
+    pub struct LightSource: 64 {
+        /// Triangles, points: centre of a sphere around them.
+        pub centre: [f32; 3],
+        /// Its radius.
+        pub radius: f32,
+        /// Unit vector that they shine along; 0 where that is to all sides.
+        pub axis: [f32; 3],
+        /// Cosine of the angle that a triangle's normal or a spot's edge leans from it at the most, or of half the angle that a sun is
+        /// seen at.
+        pub cos_cone: f32,
+        /// Triangles, points: intensity along the normal or axis. Others: irradiance.
+        pub strength: f32,
+        /// As of its lights, where all have one.
+        pub inverse_range: f32,
+        /// As of its lights.
+        pub kind: u32,
+        /// Index of its first light.
+        pub first_light: u32,
+        /// Lights.
+        pub light_count: u32,
+        /// Probability that it is chosen without knowing the point.
+        pub probability: f32,
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+    }
+
+    /// A box of starts of photon paths, and a cell of the alias table that chooses one. A start has five coordinates in [0, 1):
+    /// place x and y, direction x and y, and which light of its source.
+    pub struct EmissionCell: 64 {
+        /// Lower corner of the box, but for the last coordinate.
+        pub low: [f32; 4],
+        /// Its sides.
+        pub size: [f32; 4],
+        /// Lower end of the last coordinate.
+        pub low_light: f32,
+        /// That side.
+        pub size_light: f32,
+        /// The box's volume over its probability.
+        pub weight: f32,
+        /// Of the table's cell: the part of it that chooses this box.
+        pub accept: f32,
+        /// Of the table's cell: the box that the rest of it chooses.
+        pub alias: u32,
+        /// First light of the source.
+        pub first_light: u32,
+        /// How many it has.
+        pub lights: u32,
+        /// Index of the sphere that the paths meet first of all, or the number of spheres for those that meet none.
+        pub target: u32,
+    }
+
+    /// A grid of cubes for an object. The scene's.
+    pub struct ObjectGrid: 32 {
+        /// Corner of the object's bounding box, render units.
+        pub low: [f32; 3],
+        /// 1 / side of a cube.
+        pub inverse_cell: f32,
+        /// Cubes along each axis.
+        pub cells: [u32; 3],
+        /// Cubes of the objects before.
+        pub first_cell: u32,
+    }
+}
