@@ -32,17 +32,16 @@ float radius2_at(uint slot, uint map) {
 }
 
 Receiver receiver_at(uint slot, uint map) {
-    vec4 position_object = TEXEL(VisiblePoints, 3u * slot);
-    vec4 weight_normal = TEXEL(VisiblePoints, 3u * slot + 1u);
+    VisiblePoint point = VISIBLE_POINT(VisiblePoints, slot);
     Receiver receiver = NO_RECEIVER;
-    receiver.position = position_object.xyz;
+    receiver.position = point.position_object.xyz;
     receiver.radius2 = radius2_at(slot, map);
-    receiver.object = floatBitsToUint(position_object.w);
+    receiver.object = floatBitsToUint(point.position_object.w);
     receiver.object |= receiver.object != NO_OBJECT && map == 1u ? CAUSTIC : 0u;
-    receiver.normal = decode_octahedral(floatBitsToUint(weight_normal.w));
+    receiver.normal = decode_octahedral(floatBitsToUint(point.weight_normal.w));
     if (GLOSSY) {
         Gloss gloss = GLOSS(GlossOf, slot);
-        receiver.shading_normal = decode_direction(floatBitsToUint(TEXEL(VisiblePoints, 3u * slot + 2u).w));
+        receiver.shading_normal = decode_direction(floatBitsToUint(point.emitted_normal.w));
         receiver.viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
         receiver.reflector = reflector_of(gloss);
         receiver.coated = is_coated(gloss);

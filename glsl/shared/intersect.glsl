@@ -267,19 +267,15 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
     do {
         loop_count += 1u;
         bool is_leaf = (reference & LEAF) != 0u;
-        uint record = reference & ~LEAF;
-        vec4 row0 = TEXEL(Bvh, 4u * record);
-        vec4 row1 = TEXEL(Bvh, 4u * record + 1u);
-        vec4 row2 = TEXEL(Bvh, 4u * record + 2u);
-        vec4 row3 = TEXEL(Bvh, 4u * record + 3u);
+        BvhRecord record = BVH_RECORD(Bvh, reference & ~LEAF);
         uint far_child = 0u;
         bool push = false;
         bool pop;
         if (is_leaf) {
-            uint index = floatBitsToUint(row3.x);
-            vec3 corner0 = row0.xyz;
-            vec3 corner1 = row1.xyz;
-            vec3 corner2 = row2.xyz;
+            uint index = floatBitsToUint(record.row3.x);
+            vec3 corner0 = record.row0.xyz;
+            vec3 corner1 = record.row1.xyz;
+            vec3 corner2 = record.row2.xyz;
             bool tests = index != ignored.triangle;
             if (INSTANCED) {
                 if (instance != NO_INSTANCE) {
@@ -289,20 +285,20 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
                     corner1 = placed(rows, corner1);
                     corner2 = placed(rows, corner2);
                 }
-                tests = floatBitsToUint(row3.z) == 0u && (tests || instance != ignored.instance);
+                tests = floatBitsToUint(record.row3.z) == 0u && (tests || instance != ignored.instance);
             }
             PlacedTriangle at = PlacedTriangle(index, instance);
             if (tests && intersect_triangle(ray, local, corner0, corner1, corner2, at, progress, hit) && any_hit) {
                 return hit;
             }
-            pop = floatBitsToUint(row3.y) == 1u;
+            pop = floatBitsToUint(record.row3.y) == 1u;
             reference += 1u;
             if (INSTANCED) {
-                uint kind = floatBitsToUint(row3.z);
+                uint kind = floatBitsToUint(record.row3.z);
                 if (kind == PLACEMENT_RECORD) {
                     instance = index;
                 } else if (kind == RAY_RECORD) {
-                    local = in_instance(ray, mat3x4(row0, row1, row2), row3.w);
+                    local = in_instance(ray, mat3x4(record.row0, record.row1, record.row2), record.row3.w);
                     reference = index;
                     outside = depth;
                 }
@@ -310,10 +306,10 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
         } else {
             // Rounding puts faces in one place a little behind each other.
             float reached = COINCIDENCE ? hit.t * (1.0 + TIE) : hit.t;
-            float enter_left = enter_box(row0.xyz, row1.xyz, local, reached);
-            float enter_right = enter_box(row2.xyz, row3.xyz, local, reached);
-            uint left = floatBitsToUint(row0.w);
-            uint right = floatBitsToUint(row2.w);
+            float enter_left = enter_box(record.row0.xyz, record.row1.xyz, local, reached);
+            float enter_right = enter_box(record.row2.xyz, record.row3.xyz, local, reached);
+            uint left = floatBitsToUint(record.row0.w);
+            uint right = floatBitsToUint(record.row2.w);
             bool left_first = enter_left <= enter_right;
             reference = left_first ? left : right;
             far_child = left_first ? right : left;

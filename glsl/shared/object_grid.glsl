@@ -1,5 +1,6 @@
 // A grid of cubes for each object: its bounding box, the longest axis split into a fixed number of pieces. The scene's.
-// Include after texel.glsl.
+#include "layout.glsl"
+
 uniform usamplerBuffer ObjectGrids;
 
 ObjectGrid object_grid(uint object) {

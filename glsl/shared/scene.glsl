@@ -1,4 +1,4 @@
-// The scene as the rays see it. Include after settings.glsl, sampling.glsl, gloss.glsl and texel.glsl.
+// The scene as the rays see it. Include after settings.glsl, sampling.glsl and gloss.glsl.
 
 #include "layout.glsl"
 

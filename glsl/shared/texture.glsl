@@ -1,4 +1,4 @@
-// What a surface's material is at a place: textures and the corners' colours. Include after scene.glsl.
+// What a surface's material is at a place: textures and the corners' colours. Include after texel.glsl and scene.glsl.
 
 uniform usamplerBuffer Corners;
 uniform usamplerBuffer Textures;

@@ -23,7 +23,7 @@ void main() {
     uint slot = mesh_order[place];
     uint nearest = NO_SLOT;
     if (slot != NO_SLOT) {
-        vec4 point = TEXEL(VisiblePoints, 3u * slot);
+        vec4 point = VISIBLE_POINT(VisiblePoints, slot).position_object;
         float least = 1e30;
         uvec2 window = window_of(place / GROUP);
         for (uint run = window.x; run < window.y; run++) {

@@ -6,7 +6,6 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
 #include "visible_point.glsl"
 #include "clusters.glsl"
 
@@ -28,7 +27,7 @@ void main() {
     uvec2 window = window_of(cluster);
     for (uint place = window.x * GROUP; place < window.y * GROUP; place++) {
         if (cluster_of[place] == cluster) {
-            offset += TEXEL(VisiblePoints, 3u * mesh_order[place]).xyz - before.xyz;
+            offset += VISIBLE_POINT(VisiblePoints, mesh_order[place]).position_object.xyz - before.xyz;
             count += 1u;
         }
     }

@@ -6,7 +6,6 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
 #include "visible_point.glsl"
 #include "clusters.glsl"
 
@@ -25,7 +24,7 @@ void main() {
     for (uint i = run * GROUP; i < (run + 1u) * GROUP; i++) {
         uint slot = mesh_order[i];
         if (slot != NO_SLOT) {
-            vec4 position = TEXEL(VisiblePoints, 3u * slot);
+            vec4 position = VISIBLE_POINT(VisiblePoints, slot).position_object;
             first = count == 0u ? position : first;
             offset += position.xyz - first.xyz;
             count += 1u;

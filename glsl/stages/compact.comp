@@ -6,7 +6,6 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
 #include "photon.glsl"
 #include "status.glsl"
 

@@ -130,12 +130,18 @@ bool is_surrounded(VisiblePoint visible_point, vec2 u) {
     return scatters;
 }
 
+// 0 where no photon was accepted.
+uint accepted_by(uint receiver) {
+    Statistics statistics = STATISTICS(StatisticsOf, receiver);
+    return statistics.accepted_low | statistics.accepted_high;
+}
+
 bool has_caustic_photons(uint slot) {
-    uvec2 accepted = uvec2(0u);
+    uint accepted = 0u;
     if (settings.photon_maps > 1u) {
-        accepted = TEXEL_BITS(StatisticsOf, 3u * (slots() + slot)).zw;
+        accepted = accepted_by(slots() + slot);
     }
-    return (accepted.x | accepted.y) != 0u;
+    return accepted != 0u;
 }
 
 void main() {
@@ -149,8 +155,8 @@ void main() {
         return;
     }
     // Without photons there is nothing to correct.
-    uvec2 accepted = TEXEL_BITS(StatisticsOf, 3u * receiver).zw;
-    bool has_photons = (accepted.x | accepted.y | TEXEL_BITS(GatheredOf, 2u * receiver).w) != 0u;
+    uint gathered = floatBitsToUint(GATHERED(GatheredOf, receiver).flux_count.w);
+    bool has_photons = (accepted_by(receiver) | gathered) != 0u;
     Coverage before = coverage[receiver];
     bool trusted = before.covered == before.asked && before.asked >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
     Random random = random_of_disc(slot, push.iteration, push.points, settings.seed);

@@ -9,7 +9,6 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
-#include "texel.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
 #include "grid.glsl"
@@ -33,12 +32,12 @@ layout(std430) buffer Demand { uint demand[]; }; // float bits; cleared before
 float radiance_of(uint slot) {
     float radiance = 0.0;
     if (push.iterations > 0u) {
-        radiance = mean_of(TEXEL(DirectSums, 2u * slot).rgb) / float(push.iterations);
+        radiance = mean_of(DIRECT_SUM(DirectSums, slot).high.rgb) / float(push.iterations);
         for (uint map = 0u; map < settings.photon_maps; map++) {
             uint i = map * slots() + slot;
-            float radius2 = TEXEL(StatisticsOf, 3u * i).x;
-            float tau = mean_of(TEXEL(StatisticsOf, 3u * i + 1u).rgb);
-            radiance += tau / push.emitted / (PI * max(radius2, 1e-30) * share_of(coverage[i]));
+            Statistics statistics = STATISTICS(StatisticsOf, i);
+            float tau = mean_of(statistics.flux_high.rgb);
+            radiance += tau / push.emitted / (PI * max(statistics.radius2_high, 1e-30) * share_of(coverage[i]));
         }
     }
     return radiance;
@@ -50,7 +49,7 @@ void main() {
         return;
     }
     uint slot = i % slots();
-    vec4 position_object = TEXEL(VisiblePoints, 3u * slot);
+    vec4 position_object = VISIBLE_POINT(VisiblePoints, slot).position_object;
     uint object = floatBitsToUint(position_object.w);
     float radius2 = radii2[i];
     if (object == NO_OBJECT) {
@@ -59,7 +58,7 @@ void main() {
     float radius = sqrt(radius2);
     float footprint = max(footprints[slot], 1e-3 * radius);
     float radiance = radiance_of(slot);
-    float of_one = mean_of(TEXEL(VisiblePoints, 3u * slot + 1u).rgb) / (PI * radius2);
+    float of_one = mean_of(VISIBLE_POINT(VisiblePoints, slot).weight_normal.rgb) / (PI * radius2);
     float reached = PI * radius2 / (footprint * footprint);
     uint wanted = floatBitsToUint(clamp(of_one * of_one * reached / (radiance * radiance + settings.demand_floor2), 1e-30, 1e30));
 

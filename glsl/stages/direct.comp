@@ -49,9 +49,8 @@ layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteratio
 bool asks_behind_glass(uint slot) {
     bool asks = false;
     if (ASKS_BEHIND_GLASS) {
-        vec4 statistics = TEXEL(StatisticsOf, 3u * ((settings.photon_maps - 1u) * slots() + slot));
-        uvec2 accepted = floatBitsToUint(statistics.zw);
-        bool has_few = photons_of(accepted.x, accepted.y) < SEASONED;
+        Statistics statistics = STATISTICS(StatisticsOf, (settings.photon_maps - 1u) * slots() + slot);
+        bool has_few = photons_of(statistics.accepted_low, statistics.accepted_high) < SEASONED;
         asks = DIELECTRICS && (push.iteration % ASKS_EVERY == 0u || has_few);
     }
     return asks;

@@ -6,7 +6,6 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
 #include "photon.glsl"
 #include "grid.glsl"
 
@@ -22,7 +21,7 @@ void main() {
     if (i >= photon_count) {
         return;
     }
-    vec4 position_object = TEXEL(Photons, 2u * i);
+    vec4 position_object = PHOTON(Photons, i).position_object;
     uint of_shell = map_of(position_object) * SHELLS + shell_of(position_object.xyz);
     uint bucket = bucket_of(cell_of(position_object.xyz, grid.inverse_cell_size[of_shell]), of_shell);
     keys[i] = bucket;

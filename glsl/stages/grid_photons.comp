@@ -5,7 +5,6 @@
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
-#include "texel.glsl"
 #include "photon.glsl"
 
 layout(std430) readonly buffer ValuesIn { uint values[]; };

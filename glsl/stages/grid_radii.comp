@@ -24,7 +24,7 @@ void main() {
     if (i >= receiver_count()) {
         return;
     }
-    vec4 position_object = TEXEL(VisiblePoints, 3u * (i % slots()));
+    vec4 position_object = VISIBLE_POINT(VisiblePoints, i % slots()).position_object;
     if (floatBitsToUint(position_object.w) == NO_OBJECT) {
         return;
     }

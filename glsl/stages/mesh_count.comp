@@ -5,7 +5,6 @@
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
-#include "texel.glsl"
 #include "photon.glsl"
 
 uniform usamplerBuffer Photons;
@@ -15,6 +14,6 @@ layout(std430) buffer MeshEnds { uint mesh_ends[]; }; // cleared before
 void main() {
     uint i = invocation_index();
     if (i < photon_count) {
-        atomicAdd(mesh_ends[object_of(TEXEL(Photons, 2u * i))], 1u);
+        atomicAdd(mesh_ends[object_of(PHOTON(Photons, i).position_object)], 1u);
     }
 }

@@ -5,7 +5,6 @@
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
-#include "texel.glsl"
 #include "photon.glsl"
 #include "object_grid.glsl"
 
@@ -16,7 +15,7 @@ layout(std430) buffer ObjectCells { uint cell_photons[]; }; // cleared before
 void main() {
     uint i = invocation_index();
     if (i < photon_count) {
-        vec4 position_object = TEXEL(Photons, 2u * i);
+        vec4 position_object = PHOTON(Photons, i).position_object;
         ObjectGrid grid = object_grid(object_of(position_object));
         atomicAdd(cell_photons[cell_number(grid, cell_in(grid, position_object.xyz))], 1u);
     }

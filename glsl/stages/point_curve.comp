@@ -6,7 +6,6 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
 #include "visible_point.glsl"
 #include "object_grid.glsl"
 
@@ -32,7 +31,7 @@ void main() {
     if (slot == 0u) {
         point_count = slots();
     }
-    vec4 position_object = TEXEL(VisiblePoints, 3u * slot);
+    vec4 position_object = VISIBLE_POINT(VisiblePoints, slot).position_object;
     uint object = floatBitsToUint(position_object.w);
     uint key = 0u;
     if (object != NO_OBJECT) {

@@ -6,7 +6,6 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
 #include "visible_point.glsl"
 
 // Whether the points have an order already, which equal keys are to keep.
@@ -31,7 +30,7 @@ void main() {
         point_count = slots();
     }
     uint slot = PRESORTED ? values[i] : i;
-    uint object = floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w);
+    uint object = floatBitsToUint(VISIBLE_POINT(VisiblePoints, slot).position_object.w);
     // Slots without a visible point come last.
     keys[i] = min(object, push.meshes);
     values[i] = slot;

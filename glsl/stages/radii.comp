@@ -8,7 +8,6 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
 
@@ -25,7 +24,7 @@ void main() {
     uint slot = i % slots();
     uint map = i / slots();
     float radius2 = statistics[i].radius2_high;
-    if (floatBitsToUint(TEXEL(VisiblePoints, 3u * slot).w) != NO_OBJECT) {
+    if (floatBitsToUint(VISIBLE_POINT(VisiblePoints, slot).position_object.w) != NO_OBJECT) {
         float footprint = footprints[slot];
         if (radius2 == 0.0) {
             float first = settings.first_footprints[map] * footprint;

@@ -8,7 +8,6 @@ layout(local_size_x = 64) in;
 #include "settings.glsl"
 #include "sampling.glsl"
 #include "gloss.glsl"
-#include "texel.glsl"
 #include "scene.glsl"
 #include "intersect.glsl"
 

@@ -8,7 +8,6 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "settings.glsl"
 #include "sampling.glsl"
-#include "texel.glsl"
 #include "visible_point.glsl"
 #include "statistics.glsl"
 #include "status.glsl"
