@@ -93,9 +93,8 @@ void gather(Receiver receiver, Photon photon, inout Sum sum) {
 
 void add_gathered(uint slot, uint map, Sum sum, uint tested) {
     uint i = map * slots() + slot;
-    vec4 before = gathered[i].flux_count;
-    gathered[i].flux_count =
-        vec4(before.rgb + sum.flux, uintBitsToFloat(floatBitsToUint(before.w) + sum.count));
+    gathered[i].flux += sum.flux;
+    gathered[i].count += sum.count;
     gathered[i].moment += sum.moment;
     if (COUNT_TESTS) {
         tests[i] = (tests[i] + tested) | GATHERED_FOR;

@@ -8,7 +8,7 @@ float mean_of(vec3 v) {
 // Σ flux · (1 − 2 distance²/R²): 0 on average where photons lie evenly. Where their density bends, as r², it is −1/3 of
 // the flux that R makes too many.
 float curvature(Gathered gathered, float radius2) {
-    return mean_of(gathered.flux_count.rgb) - 2.0 * gathered.moment / radius2;
+    return mean_of(gathered.flux) - 2.0 * gathered.moment / radius2;
 }
 
 // Photons that a visible point has accepted, as far as 32 bits hold. What may have brought light behind glass are those of the

@@ -155,8 +155,7 @@ void main() {
         return;
     }
     // Without photons there is nothing to correct.
-    uint gathered = floatBitsToUint(GATHERED(GatheredOf, receiver).flux_count.w);
-    bool has_photons = (accepted_by(receiver) | gathered) != 0u;
+    bool has_photons = (accepted_by(receiver) | GATHERED(GatheredOf, receiver).count) != 0u;
     Coverage before = coverage[receiver];
     bool trusted = before.covered == before.asked && before.asked >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
     Random random = random_of_disc(slot, push.iteration, push.points, settings.seed);

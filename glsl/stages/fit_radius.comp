@@ -24,12 +24,12 @@ void main() {
     if (i >= receiver_count()) {
         return;
     }
-    float found = float(floatBitsToUint(gathered[i].flux_count.w));
+    float found = float(gathered[i].count);
     float wanted = push.wanted[i / slots()];
     if (found > wanted) {
         float least = push.least * footprints[i % slots()];
         float radius2 = statistics[i].radius2_high;
         statistics[i].radius2_high = max(radius2 * (wanted / found), min(radius2, least * least));
     }
-    gathered[i] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
+    gathered[i] = Gathered(vec3(0.0), 0u, 0.0, 0u, 0u, 0u);
 }

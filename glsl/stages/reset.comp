@@ -16,6 +16,6 @@ void main() {
     uint i = invocation_index();
     if (i < receiver_count()) {
         statistics[i] = Statistics(0.0, 0.0, 0u, 0u, vec4(0.0), vec4(0.0));
-        gathered[i] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
+        gathered[i] = Gathered(vec3(0.0), 0u, 0.0, 0u, 0u, 0u);
     }
 }

@@ -26,12 +26,12 @@ layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteratio
 // Radiance (RGB and curvature) that one iteration's photons of a map give a visible point.
 vec4 update_map(uint receiver, vec3 weight) {
     Gathered arrived = gathered[receiver];
-    if (floatBitsToUint(arrived.flux_count.w) == 0u) {
+    if (arrived.count == 0u) {
         return vec4(0.0); // nothing has come, and nothing changes
     }
-    gathered[receiver] = Gathered(vec4(0.0), 0.0, 0u, 0u, 0u);
+    gathered[receiver] = Gathered(vec3(0.0), 0u, 0.0, 0u, 0u, 0u);
     Statistics mine = statistics[receiver];
-    vec4 flux = vec4(weight * arrived.flux_count.rgb, mean_of(weight) * curvature(arrived, radii2[receiver]));
+    vec4 flux = vec4(weight * arrived.flux, mean_of(weight) * curvature(arrived, radii2[receiver]));
     // τ is that of a disc of R. A smaller one has been gathered from where that has a bound, see `radii`.
     float radius2 = mine.radius2_high;
     flux *= radius2 / radii2[receiver];
@@ -39,7 +39,7 @@ vec4 update_map(uint receiver, vec3 weight) {
         atomicAdd(status.non_finite, 1u);
         return vec4(0.0);
     }
-    update_statistics(mine, flux, floatBitsToUint(arrived.flux_count.w), settings.alpha);
+    update_statistics(mine, flux, arrived.count, settings.alpha);
     statistics[receiver] = mine;
     return flux / push.photons / (PI * radius2 * share_of(coverage[receiver]));
 }

@@ -291,7 +291,7 @@ fn object(point: &VisiblePoint) -> u32 {
 }
 
 fn count_of(gathered: &Gathered) -> u32 {
-    gathered.flux_count[3].to_bits()
+    gathered.count
 }
 
 /// Result of some work, and the microseconds that it took.

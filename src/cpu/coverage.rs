@@ -41,7 +41,7 @@ pub fn coverage(
                 return;
             }
             // Without photons there is nothing to correct.
-            let photons = statistics.accepted_low | statistics.accepted_high | word(gathered.flux_count);
+            let photons = statistics.accepted_low | statistics.accepted_high | gathered.count;
             let trusted = coverage.covered == coverage.asked && coverage.asked >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
             let random = Random::of_disc(inputs.config, slot as u32, iteration, points);
             if photons == 0 && index < visible_points.len() && coverage.surrounded == 0 && !has_caustic_photons(slot) {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::camera::SeenSlice;
 use super::gloss::Reflector;
 use super::sampling::decode_direction;
-use super::vector::{mean, word, xyz};
+use super::vector::{mean, rgb, word, xyz};
 use crate::error::{Error, Result};
 use crate::layout::{CAUSTIC, Gathered, NO_OBJECT, Photon, VisiblePoint};
 
@@ -32,9 +32,9 @@ impl Sum {
     }
 
     fn add_to(&self, gathered: &mut Gathered) {
-        let flux = (xyz(gathered.flux_count) + self.flux).as_vec3();
-        let count = word(gathered.flux_count) + self.count;
-        gathered.flux_count = [flux.x, flux.y, flux.z, f32::from_bits(count)];
+        let flux = (rgb(gathered.flux) + self.flux).as_vec3();
+        gathered.flux = flux.to_array();
+        gathered.count += self.count;
         gathered.moment = (f64::from(gathered.moment) + self.moment) as f32;
     }
 }

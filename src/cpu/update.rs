@@ -7,7 +7,7 @@ use glam::DVec4;
 use rayon::prelude::*;
 
 use super::resolve::share_of;
-use super::vector::{from_two_float, from_two_floats, mean, to_two_float, to_two_floats, word, xyz};
+use super::vector::{from_two_float, from_two_floats, mean, rgb, to_two_float, to_two_floats, word, xyz};
 use super::{Counts, Seen};
 use crate::layout::{Coverage, Gathered, NO_OBJECT, SMALLEST_RADIUS2, Settings, Statistics, VisiblePoint};
 
@@ -49,7 +49,7 @@ pub fn radii(settings: &Settings, seen: &Seen, statistics: &mut [Statistics]) ->
 
 /// Σ flux · (1 − 2 distance²/R²), flux as the mean of its channels: 0 on average where photons lie evenly.
 fn curvature(gathered: &Gathered, radius2: f64) -> f64 {
-    mean(xyz(gathered.flux_count)) - 2.0 * f64::from(gathered.moment) / radius2
+    mean(rgb(gathered.flux)) - 2.0 * f64::from(gathered.moment) / radius2
 }
 
 /// Where a gather of pilot photons found more than are `wanted` of its map, shrinks the radius until it would hold as many,
@@ -64,7 +64,7 @@ pub fn fit_radius(
     let slots = footprints.len();
     let receivers = statistics.par_iter_mut().zip(gathered).enumerate();
     receivers.for_each(|(index, (statistics, gathered))| {
-        let found = word(gathered.flux_count) as f32;
+        let found = gathered.count as f32;
         let wanted = wanted[index / slots];
         if found > wanted {
             let least2 = f64::from(least * footprints[index % slots]).powi(2);
@@ -114,8 +114,8 @@ pub fn update(
             let curvature = mean(weight) * curvature(gathered, f64::from(radius2));
             // τ is that of a disc of R. A smaller one has been gathered from where that has a bound.
             let larger = f64::from(statistics.radius2_high) / f64::from(radius2);
-            let flux = (weight * xyz(gathered.flux_count)).extend(curvature) * larger;
-            let new_photons = word(gathered.flux_count);
+            let flux = (weight * rgb(gathered.flux)).extend(curvature) * larger;
+            let new_photons = gathered.count;
             *gathered = Gathered::zeroed();
             if !flux.as_vec4().is_finite() {
                 counts.add_non_finite(1);

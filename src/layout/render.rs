@@ -136,8 +136,10 @@ device_structs! {
 
     /// An iteration's photons of a visible point.
     pub struct Gathered: 32 {
-        /// rgb: Σ flux; w: u32 bits, M.
-        pub flux_count: [f32; 4],
+        /// Σ flux.
+        pub flux: [f32; 3],
+        /// M.
+        pub count: u32,
         /// Σ flux · distance², flux as the mean of its channels.
         pub moment: f32,
         /// Zero.

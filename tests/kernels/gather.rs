@@ -26,10 +26,7 @@ fn radii2(statistics: &[Statistics]) -> Vec<f32> {
 
 /// M of each slot.
 fn counts(gathered: &[Gathered]) -> Vec<u32> {
-    gathered
-        .iter()
-        .map(|gathered| gathered.flux_count[3].to_bits())
-        .collect()
+    gathered.iter().map(|gathered| gathered.count).collect()
 }
 
 /// Gathers with every method on the device, updates the statistics, and compares both with the CPU's. Returns M.

@@ -149,7 +149,8 @@ fn radii_shrink_where_more_photons_than_wanted_were_found_but_not_below_a_part_o
     let (wanted, least) = ([7.5f32, 20.0], 0.5f32);
     let gathered: Vec<Gathered> = (0..receivers)
         .map(|i| Gathered {
-            flux_count: [1.0, 2.0, 3.0, f32::from_bits(i * i)],
+            flux: [1.0, 2.0, 3.0],
+            count: i * i,
             moment: 0.5,
             ..Gathered::zeroed()
         })

@@ -155,12 +155,8 @@ fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
     const EACH: u32 = 500_000;
     let mut bench = bench(2.0 / 3.0);
     let gathered = Gathered {
-        flux_count: [
-            FLUX[0] * EACH as f32,
-            FLUX[1] * EACH as f32,
-            FLUX[2] * EACH as f32,
-            f32::from_bits(EACH),
-        ],
+        flux: FLUX.map(|flux| flux * EACH as f32),
+        count: EACH,
         ..Gathered::zeroed()
     };
     let mut update = Recording::new();
