@@ -265,7 +265,7 @@ pub struct SpecConstant {
     pub name: &'static str,
 }
 
-/// A compiled stage, as `build/main.rs` describes it.
+/// A compiled stage, as `build.rs` describes it.
 #[derive(Debug)]
 pub struct Shader {
     /// The stage's name: its file, its timestamps' key, its debug label, its line in the report.

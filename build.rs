@@ -4,6 +4,7 @@
 //! A block's name in GLSL is its buffer's name in [`BufferId`](src/stage.rs): a name without a variant of that enum
 //! fails the compilation of the generated module. Bindings are numbered by the compiler and never written by hand.
 
+#[path = "build/layout.rs"]
 mod layout;
 
 use std::collections::BTreeMap;
@@ -19,6 +20,7 @@ use spirq::var::Variable;
 
 fn main() -> Result<()> {
     println!("cargo:rerun-if-changed=glsl");
+    println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=build");
     println!("cargo:rerun-if-changed=src/layout");
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
