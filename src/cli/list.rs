@@ -70,7 +70,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
         .map_err(|what| crate::error::Error::scene(path, what))?;
     let memory = memory(&scene, &packed);
     let count = |is: fn(&Surface) -> bool| scene.materials.iter().filter(|material| is(&material.surface)).count();
-    let emissive = scene.emissive_triangles().len();
+    let emissive = scene.emissive_triangle_count();
     let notes: Vec<&String> = scene.notes.iter().chain(&packed.notes).collect();
     let to_world = |p: glam::Vec3| p.as_dvec3() / scene.normalisation.scale + scene.normalisation.centre;
     let (low, high) = scene.bounds();

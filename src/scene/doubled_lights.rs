@@ -1,6 +1,6 @@
 //! Lamps that a file has twice in one place: a ray meets one of them, so that one alone is a light.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::Vec3;
 
@@ -30,24 +30,13 @@ fn place_of(scene: &Scene, triangle: u32) -> Place {
 /// and which one stays: that of the last object, which is what rays meet.
 pub(super) fn take_doubles(scene: &Scene, shining: &mut Vec<(EmissiveTriangle, Shine)>) -> Vec<[u32; 2]> {
     let mut stay: HashMap<Place, u32> = HashMap::new();
-    for (light, shine) in shining.iter() {
-        if shine.columns == 1 {
-            stay.insert(place_of(scene, light.triangle), light.triangle);
-        }
-    }
-    let mut doubles = Vec::new();
-    if stay.len() == shining.len() {
-        return doubles;
-    }
-    shining.retain(|(light, shine)| {
-        let stays = match stay.get(&place_of(scene, light.triangle)) {
-            Some(&stays) if shine.columns == 1 => stays,
-            _ => light.triangle,
-        };
-        if stays != light.triangle {
-            doubles.push([light.triangle, stays]);
-        }
-        stays == light.triangle
+    let even = shining.iter().rev().filter(|(_, shine)| shine.columns == 1);
+    let with_those_that_stay = even.map(|(light, _)| {
+        let stays = stay.entry(place_of(scene, light.triangle)).or_insert(light.triangle);
+        [light.triangle, *stays]
     });
+    let doubles: Vec<[u32; 2]> = with_those_that_stay.filter(|[light, stays]| light != stays).collect();
+    let gone: HashSet<u32> = doubles.iter().map(|[light, _]| *light).collect();
+    shining.retain(|(light, _)| !gone.contains(&light.triangle));
     doubles
 }

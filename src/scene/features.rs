@@ -1,5 +1,6 @@
 //! What of the renderer a scene needs: the kernels are specialised for it and have no code for the rest.
 
+use super::part::Part;
 use crate::layout::{
     BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, GLOSSY_SURFACE, Light, MIRROR,
     Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED_TRIANGLE,
@@ -117,7 +118,7 @@ impl SceneFeatures {
         for light in lights {
             features.punctual |= [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&light.kind);
             features.soft |= light.extent > 0.0;
-            features.parted |= light.kind == TRIANGLE_LIGHT && light.position[2] > 1.0;
+            features.parted |= light.kind == TRIANGLE_LIGHT && !Part::of(light).is_whole();
             features.environment |= light.kind == ENVIRONMENT_LIGHT;
         }
         features

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::nesting::{Nesting, is_solid};
-use super::{Object, Scene};
+use super::{Object, Part, Scene};
 use crate::layout::{Light, POINT_LIGHT, RANK, SPOT_LIGHT, TRIANGLE_LIGHT, VACUUM};
 
 /// In no medium.
@@ -56,8 +56,9 @@ impl Immersion {
     pub fn media_at(&self, point: Vec3) -> [u32; 4] {
         let mut media = Vec::new();
         let mut hollows = Vec::new();
+        let seen = view() * point.as_dvec3();
         for solid in &self.solids {
-            let sides = solid.sides(point);
+            let sides = solid.sides(seen);
             if sides > 0 {
                 media.push(solid.medium);
             } else if sides < -1 {
@@ -95,7 +96,17 @@ impl Immersion {
             POINT_LIGHT | SPOT_LIGHT => self.media_at(light.position.into()),
             _ => IN_VACUUM,
         };
-        lights.iter().map(of_light).collect()
+        // The parts of a triangle follow each other.
+        let mut media: Vec<[u32; 4]> = Vec::with_capacity(lights.len());
+        for (index, light) in lights.iter().enumerate() {
+            let is_next_part = light.kind == TRIANGLE_LIGHT && Part::of(light).number() > 0;
+            media.push(if is_next_part {
+                media[index - 1]
+            } else {
+                of_light(light)
+            });
+        }
+        media
     }
 }
 
@@ -110,10 +121,7 @@ impl Solid {
     fn new(scene: &Scene, object: &Object, medium: u32) -> Self {
         let mirrored = object.placement.is_some_and(|placement| placement.is_mirrored());
         let view = view();
-        let seen = |corner: Vec3| {
-            let corner = object.placement.map_or(corner, |placement| placement.point(corner));
-            (view * corner.as_dvec3()).as_vec3()
-        };
+        let seen = |corner: Vec3| (view * object.placed(corner).as_dvec3()).as_vec3();
         let triangles = object.triangles.clone();
         let corners: Vec<[Vec3; 3]> = triangles
             .map(|triangle| {
@@ -179,9 +187,9 @@ impl Solid {
         [0, 1].map(|axis| (place[axis] as usize).min(self.cells[axis] - 1))
     }
 
-    /// How many more backs than fronts the line meets, from the point to both of its ends: 2 within a closed solid.
-    fn sides(&self, point: Vec3) -> i32 {
-        let seen = view() * point.as_dvec3();
+    /// How many more backs than fronts the line meets, from a point to both of its ends: 2 within a closed solid. `seen`: along the
+    /// line.
+    fn sides(&self, seen: DVec3) -> i32 {
         let across = seen.truncate();
         let [x, y] = self.column(across);
         let column = y * self.cells[0] + x;

@@ -32,6 +32,11 @@ impl Scene {
         self.emitting_objects().next().is_some()
     }
 
+    /// How many triangles emit light.
+    pub fn emissive_triangle_count(&self) -> usize {
+        self.emitting_objects().map(|(object, _)| object.triangles.len()).sum()
+    }
+
     /// The triangles that emit light, in the order of [`Scene::triangles`].
     ///
     /// Photons are emitted, and lights sampled, nearly in proportion to their powers.
@@ -45,21 +50,24 @@ impl Scene {
 
     /// Each with the way it shines over its area, and whether some would have to be known more finely than they are.
     pub(super) fn shining_triangles(&self) -> (Vec<(EmissiveTriangle, Shine)>, bool) {
-        let triangles: Vec<(u32, f64)> = self
+        let even: Vec<EmissiveTriangle> = self
             .emitting_objects()
-            .flat_map(|(object, exitance)| object.triangles.clone().map(move |triangle| (triangle, exitance)))
+            .flat_map(|(object, exitance)| {
+                object.triangles.clone().map(move |triangle| {
+                    let area = self.triangle_area(triangle);
+                    EmissiveTriangle {
+                        triangle,
+                        area,
+                        power: exitance * area,
+                    }
+                })
+            })
             .collect();
-        let power = |&(triangle, exitance): &(u32, f64)| (triangle, exitance * self.triangle_area(triangle));
-        let (shines, is_coarse) = Shine::of_all(self, &triangles.iter().map(power).collect::<Vec<_>>());
-        let shining = |((triangle, exitance), shine): ((u32, f64), Shine)| {
-            let area = self.triangle_area(triangle);
-            let emissive = EmissiveTriangle {
-                triangle,
-                area,
-                power: exitance * shine.mean * area,
-            };
-            (emissive, shine)
+        let (shines, is_coarse) = Shine::of_all(self, &even);
+        let shining = |(even, shine): (EmissiveTriangle, Shine)| {
+            let power = even.power * shine.mean;
+            (EmissiveTriangle { power, ..even }, shine)
         };
-        (triangles.into_iter().zip(shines).map(shining).collect(), is_coarse)
+        (even.into_iter().zip(shines).map(shining).collect(), is_coarse)
     }
 }

@@ -41,7 +41,7 @@ pub(super) struct Lights {
     pub sources: Vec<Range<u32>>,
     /// What they emit together, mean of RGB.
     pub power: f64,
-    /// Triangles that lie where another one shines, and that one; in [`Scene::triangles`].
+    /// Triangles that lie where another one shines, and that one; in leaf order.
     pub doubles: Vec<[u32; 2]>,
     /// Whether some triangle would have to have more parts.
     pub is_coarse: bool,
@@ -50,8 +50,14 @@ pub(super) struct Lights {
 /// The lights, where triangles lie in this order.
 pub(super) fn lights(scene: &Scene, order: &[u32]) -> Lights {
     let (mut shining, is_coarse) = scene.shining_triangles();
+    let mut place = vec![0; scene.triangles.len()];
+    for (packed, &index) in order.iter().enumerate() {
+        place[index as usize] = packed as u32;
+    }
     let doubles = take_doubles(scene, &mut shining);
-    let (mut candidates, mut sources) = emissive_triangles(scene, order, shining);
+    let doubles = doubles.iter().map(|pair| pair.map(|index| place[index as usize]));
+    let doubles = doubles.collect();
+    let (mut candidates, mut sources) = emissive_triangles(scene, &place, shining);
     let triangles = candidates.len() as u32;
     let punctual_lights = scene.lights.iter().map(|light| punctual(scene, light));
     let mut others: Vec<(Light, f64)> = punctual_lights.chain(environment(scene)).collect();
@@ -102,16 +108,12 @@ pub(crate) fn set_alias_table(lights: &mut [Light], probabilities: &[f64]) {
     }
 }
 
-/// Lights of triangles, and the range of each object's.
+/// Lights of triangles, and the range of each object's. `place`: of each triangle in leaf order.
 fn emissive_triangles(
     scene: &Scene,
-    order: &[u32],
+    place: &[u32],
     mut shining: Vec<(EmissiveTriangle, Shine)>,
 ) -> (Vec<Candidate>, Vec<Range<u32>>) {
-    let mut place = vec![0; scene.triangles.len()];
-    for (packed, &index) in order.iter().enumerate() {
-        place[index as usize] = packed as u32;
-    }
     let object_of = |light: &EmissiveTriangle| scene.triangles[light.triangle as usize].object as usize;
     shining.sort_by_key(|(light, _)| (object_of(light), place[light.triangle as usize]));
     for of_object in shining.chunk_by_mut(|(a, _), (b, _)| object_of(a) == object_of(b)) {

@@ -250,6 +250,13 @@ pub struct Object {
     pub placement: Option<Placement>,
 }
 
+impl Object {
+    /// Where a corner of one of its triangles is, in render space.
+    fn placed(&self, corner: Vec3) -> Vec3 {
+        self.placement.map_or(corner, |placement| placement.point(corner))
+    }
+}
+
 /// A triangle of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Triangle {
@@ -401,12 +408,9 @@ impl Scene {
 
     /// Area of the object with that index, in square render units.
     pub fn object_area(&self, object: u32) -> f64 {
-        let Object {
-            triangles, placement, ..
-        } = &self.objects[object as usize];
-        let place = |corner: Vec3| placement.map_or(corner, |placement| placement.point(corner));
-        let corners = triangles.clone().map(|triangle| self.corners_of(triangle).map(place));
-        corners.map(area).sum()
+        let object = &self.objects[object as usize];
+        let placed = |triangle: u32| self.corners_of(triangle).map(|corner| object.placed(corner));
+        object.triangles.clone().map(placed).map(area).sum()
     }
 }
 

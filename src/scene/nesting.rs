@@ -83,9 +83,7 @@ impl Solid {
         let mut volume = 0.0;
         let mut centre = None;
         for triangle in object.triangles.clone() {
-            let corners = scene
-                .corners_of(triangle)
-                .map(|corner| object.placement.map_or(corner, |placement| placement.point(corner)));
+            let corners = scene.corners_of(triangle).map(|corner| object.placed(corner));
             for corner in corners {
                 low = low.min(corner);
                 high = high.max(corner);

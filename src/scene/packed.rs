@@ -121,18 +121,8 @@ impl PackedScene {
         for (index, light) in emissive {
             shading_triangles[light.triangle as usize].light = index as u32;
         }
-        if !light_table.doubles.is_empty() {
-            let mut packed = vec![0; bvh.order.len()];
-            for (place, &triangle) in bvh.order.iter().enumerate() {
-                packed[triangle as usize] = place;
-            }
-            for [double, light] in light_table
-                .doubles
-                .iter()
-                .map(|pair| pair.map(|triangle| packed[triangle as usize]))
-            {
-                shading_triangles[double].light = shading_triangles[light].light;
-            }
+        for &[double, light] in &light_table.doubles {
+            shading_triangles[double as usize].light = shading_triangles[light as usize].light;
         }
         let materials: Vec<Material> = scene.materials.iter().map(material).collect();
         let nesting = Nesting::of(scene)?;

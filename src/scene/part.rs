@@ -52,6 +52,11 @@ impl Part {
         [self.column as f32, self.row as f32, self.columns as f32]
     }
 
+    /// Whether it is all of its triangle.
+    pub fn is_whole(self) -> bool {
+        self.columns == 1.0
+    }
+
     /// Its number among those of its triangle.
     pub fn number(self) -> u32 {
         (self.row * self.columns + self.column) as u32
@@ -69,7 +74,7 @@ impl Part {
 
     /// Its corners, for those of the triangle.
     pub fn corners(self, [a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
-        if self.columns == 1.0 {
+        if self.is_whole() {
             return [a, b, c];
         }
         [DVec2::ZERO, DVec2::X, DVec2::Y].map(|corner| {

@@ -216,6 +216,7 @@ fn place(
         range: range.filter(|_| !is_directional),
     })
 }
+
 /// The radius of a point or spot in render units. One that the scene's coordinates can't tell from none is none.
 fn radius_of(radius: f64) -> Check<f64> {
     if radius > LARGEST_RADIUS {

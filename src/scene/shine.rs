@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::part::Part;
-use super::{Alpha, Material, Scene, Triangle};
+use super::{Alpha, EmissiveTriangle, Material, Scene, Triangle};
 use crate::layout::TextureLookup;
 
 /// Parts along a side of a triangle, at the most.
@@ -63,10 +63,10 @@ impl Shine {
         self.shares.get(number as usize).copied().unwrap_or(1.0)
     }
 
-    /// Of triangles that emit, given with their powers as if there were no textures; and whether some would have to be cut into more
+    /// Of triangles that emit, with their powers as if there were no textures; and whether some would have to be cut into more
     /// parts than they are.
-    pub fn of_all(scene: &Scene, triangles: &[(u32, f64)]) -> (Vec<Self>, bool) {
-        let textured = triangles.par_iter().map(|&(index, _)| Textured::of(scene, index));
+    pub fn of_all(scene: &Scene, triangles: &[EmissiveTriangle]) -> (Vec<Self>, bool) {
+        let textured = triangles.par_iter().map(|light| Textured::of(scene, light.triangle));
         let textured: Vec<Option<Textured<'_>>> = textured.collect();
         let asked = || textured.iter().flatten().map(Textured::asked);
         let within = |most: u32| asked().map(|asked| u64::from(asked.min(most)).pow(2)).sum::<u64>() <= MOST_ASKED;
@@ -114,12 +114,12 @@ impl Shine {
 }
 
 /// How much noise parts of each triangle may have: what hardly shines beside the rest of its object needn't be known well.
-fn enough_noise(scene: &Scene, triangles: &[(u32, f64)], levels: &[Option<Level>]) -> Vec<f64> {
+fn enough_noise(scene: &Scene, triangles: &[EmissiveTriangle], levels: &[Option<Level>]) -> Vec<f64> {
     let mean = |level: &Option<Level>| level.as_ref().map_or(1.0, |level| level.mean);
     let powers = || {
-        triangles.iter().zip(levels).map(|(&(triangle, power), level)| {
-            let object = scene.triangles[triangle as usize].object as usize;
-            (object, power * mean(level))
+        triangles.iter().zip(levels).map(|(light, level)| {
+            let object = scene.triangles[light.triangle as usize].object as usize;
+            (object, light.power * mean(level))
         })
     };
     let mut of_objects = vec![(0.0, 0.0); scene.objects.len()];
