@@ -1,13 +1,13 @@
 // Where photon paths start. Include after random.glsl, environment.glsl and light.glsl.
 
 #include "guide.glsl"
+
 struct Emission {
     vec3 origin;
     vec3 direction;
     vec3 flux;
     PlacedTriangle ignored; // the triangle that it leaves
     float inverse_range; // of a punctual light
-    uint light;
 };
 
 // What paths are to pass through.
@@ -52,7 +52,7 @@ AimedStart emit_from_afar(vec3 towards, vec3 irradiance, float area, vec2 place,
     vec3 passed = target.sphere.xyz + basis(-towards) * vec3(radius * disc_point(place), 0.0);
     vec3 origin = passed + towards * (scene_radius - dot(target.sphere.xyz, towards));
     float disc = target.everything ? area : PI * radius * radius;
-    return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0, 0u), passed, true, true);
+    return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0), passed, true, true);
 }
 
 AimedStart emit_directional(Light light, vec2 place, vec2 turn, Target target) {
@@ -71,7 +71,7 @@ AimedStart emit_directional(Light light, vec2 place, vec2 turn, Target target) {
         area = PI * radius * radius;
         origin -= light.direction * dot(passed - light.position, light.direction);
     }
-    return AimedStart(Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0, 0u), passed, true, true);
+    return AimedStart(Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0), passed, true, true);
 }
 
 AimedStart emit_environment(float area, vec2 place, vec2 direction, Target target) {
@@ -113,13 +113,13 @@ AimedStart emit_point(Light light, vec2 place, vec2 u, Target target) {
         origin += basis(direction) * vec3(light.extent * disc_point(place), 0.0);
         on_target = false;
     }
-    return AimedStart(Emission(origin, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range, 0u), origin, false,
+    return AimedStart(Emission(origin, direction, intensity * solid_angle, NO_TRIANGLE, light.inverse_range), origin, false,
                       on_target);
 }
 
-AimedStart emit_triangle(uint index, Light light, vec2 place, vec2 u, float side, Target target) {
+AimedStart emit_triangle(Light light, vec2 place, vec2 u, float side, Target target) {
     PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
-    Surface emitter = surface_at(triangle, point_of_light(index, place));
+    Surface emitter = surface_at(triangle, point_of_light(light, place));
     Material material = emitter_of(emitter);
     vec3 normal = emitter.geometric_normal;
     bool both_sides = emits(material, false);
@@ -142,7 +142,7 @@ AimedStart emit_triangle(uint index, Light light, vec2 place, vec2 u, float side
     }
     vec3 flux = emitted_radiance(material, max(0.0, dot(direction, normal))) *
                 (projected * sides * light.area * share_there(emitter));
-    return AimedStart(Emission(origin, direction, flux, triangle, 0.0, 0u), origin, false, in_cone);
+    return AimedStart(Emission(origin, direction, flux, triangle, 0.0), origin, false, in_cone);
 }
 
 // From a light towards a target; flux over the density of the coordinates' choice.
@@ -157,16 +157,17 @@ AimedStart emit_from(uint index, vec2 place, vec2 direction, float side, Target 
     if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
         return emit_environment(light.area, place, direction, target);
     }
-    return emit_triangle(index, light, place, direction, side, target);
+    return emit_triangle(light, place, direction, side, target);
 }
 
 // A path without flux where another target comes before the one that it was chosen for.
-Emission emit_aimed(vec4 u, vec4 w) {
+Emission emit_aimed(vec4 u, vec4 w, out uint light) {
     EmissionTableSize size = emission_table_size();
     Start start = choose_start(size, u, w);
+    light = start.light;
     if (start.weight == 0.0) {
         // Not to be traced, see emission::Aim.
-        return Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0, 0u);
+        return Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0);
     }
     Target target = EVERYTHING;
     if (start.target < size.targets) {
@@ -174,22 +175,21 @@ Emission emit_aimed(vec4 u, vec4 w) {
     }
     AimedStart aimed = emit_from(start.light, start.place, start.direction, w.y, target);
     Emission emission = aimed.emission;
-    emission.light = start.light;
     bool kept = meets_first(size, start.target, aimed.on_target, aimed.passed, emission.direction, aimed.from_afar);
     emission.flux *= kept ? start.weight / start.probability : 0.0;
     return emission;
 }
 
-Emission emit(inout Random random) {
+Emission emit(inout Random random, out uint light) {
     // Place and direction are one point of four dimensions: what is left of the number that chose the light is the first.
     vec4 u = next4(random);
     vec4 w = next4(random);
     if (AIMED) {
-        return emit_aimed(u, w);
+        return emit_aimed(u, w, light);
     }
     Choice choice = choose_light(u.x, w.xz);
     Emission emission = emit_from(choice.index, vec2(choice.rest, u.y), u.zw, w.y, EVERYTHING).emission;
     emission.flux /= light_at(choice.index).probability;
-    emission.light = choice.index;
+    light = choice.index;
     return emission;
 }

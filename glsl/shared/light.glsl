@@ -21,16 +21,12 @@ Media media_of_light(uint light) {
     return media;
 }
 
-// Which part of its triangle a light is: column, row, and how many columns there are. See scene::part.
-vec3 part_of(uint light) {
-    return light_at(light).position;
-}
-
 // Barycentric coordinates of a point of a triangle's light.
-vec2 point_of_light(uint light, vec2 u) {
+vec2 point_of_light(Light light, vec2 u) {
     vec2 uv = triangle_point(u);
     if (PARTED_LIGHTS) {
-        vec3 part = part_of(light);
+        // Which part of the triangle it is: column, row, and how many columns there are. See scene::part.
+        vec3 part = light.position;
         vec2 at = (part.xy + uv) / part.z;
         uv = part.x + part.y >= part.z ? 1.0 - at : at;
     }
@@ -41,7 +37,7 @@ vec2 point_of_light(uint light, vec2 u) {
 uint light_at_place(Surface surface) {
     uint light = surface.light;
     if (PARTED_LIGHTS) {
-        float n = part_of(light).z;
+        float n = light_at(light).position.z;
         vec2 at = surface.uv * n;
         float row = clamp(floor(at.y), 0.0, n - 1.0);
         float column = clamp(floor(at.x), 0.0, n - 1.0 - row);

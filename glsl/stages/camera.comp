@@ -191,6 +191,7 @@ void main() {
                 seen = soft_lights_along(from, branch.direction, way_of(hit) - progress.t, branch.media.first);
             }
             Encounter met;
+            vec3 kept = vec3(1.0); // of what comes along the ray
             if (missed) {
                 seen += radiance_from_afar(branch.direction);
             } else {
@@ -200,7 +201,6 @@ void main() {
                     progress = past(hit);
                     continue;
                 }
-                vec3 kept = vec3(1.0);
                 if (ABSORPTION) {
                     kept = transmittance(met.through.first, hit.t);
                 }
@@ -228,9 +228,7 @@ void main() {
                 ended = true;
             } else if (goes_on) {
                 branch.way += hit.t;
-                if (ABSORPTION) {
-                    branch.throughput *= transmittance(met.through.first, hit.t);
-                }
+                branch.throughput *= kept;
                 branch.ignored = met.surface.triangle;
                 branch.lamps_seen = false;
                 if (NESTED && met.hidden) {

@@ -124,7 +124,7 @@ LightSample sample_light(vec3 position, vec3 normal, vec3 origin, uint of_source
         sampled.density = sky.density * probability;
     } else {
         PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
-        Surface emitter = surface_at(triangle, point_of_light(chosen, u.yz));
+        Surface emitter = surface_at(triangle, point_of_light(light, u.yz));
         // Both ends move off their surfaces.
         sampled.ray = origin_towards(emitter, position - emitter.position) - origin;
         sampled.end = 1.0 - ENDS_BEFORE;

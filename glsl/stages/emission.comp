@@ -28,7 +28,8 @@ void main() {
         return;
     }
     Random random = random_of_path(path);
-    Emission emission = emit(random);
+    uint light;
+    Emission emission = emit(random, light);
     path_starts[path] = PathStart(emission.origin, emission.ignored.triangle, emission.direction, emission.inverse_range,
-                                  emission.flux, emission.light);
+                                  emission.flux, light);
 }
