@@ -5,10 +5,14 @@ mod sizes;
 mod tiles;
 
 pub use sizes::{
-    EXHAUSTIVE_RANGE, LLOYD_ROUNDS, Limits, MOST_EMISSION_CELLS, MOST_TARGETS, PPM_SLOTS, Probe, RUN_ON_CPU,
-    SCAN_BLOCK, SORT_DIGIT_BITS, SORT_TILE, Sizes,
+    EXHAUSTIVE_RANGE, LLOYD_ROUNDS, Limits, MOST_EMISSION_CELLS, MOST_TARGETS, PPM_SLOTS, Probe, SORT_DIGIT_BITS,
+    Sizes, clustered_run,
 };
 pub use tiles::pixel_of;
+
+use std::fmt::Display;
+
+use ranges::Checked;
 
 use crate::error::{Error, Result};
 pub use crate::layout::SEQUENCES;
@@ -146,6 +150,13 @@ pub fn iterations_of(sequence: u32, iterations: u32) -> u32 {
 /// Paths of a pixel in an iteration at the most: so many cost little beside as many photon paths.
 const MOST_CAMERA_PATHS: u32 = 8;
 
+fn in_range<T>(flag: &str, value: impl Display, checked: Checked<T>) -> Result<()> {
+    match checked {
+        Ok(_) => Ok(()),
+        Err(wrong) => Err(Error::Config(format!("--{flag} {value}: {wrong}"))),
+    }
+}
+
 impl RenderConfig {
     /// What the user gets who says nothing; the arguments' defaults are these.
     pub const DEFAULT: Self = Self {
@@ -173,35 +184,19 @@ impl RenderConfig {
     /// The first setting outside its range.
     pub fn check(&self) -> Result<()> {
         let [width, height] = self.resolution;
-        let optional = |value: Option<String>| value.unwrap_or_default();
-        let settings = [
-            (
-                "resolution",
-                format!("{width}x{height}"),
-                ranges::resolution(self.resolution).err(),
-            ),
-            ("alpha", self.alpha.to_string(), ranges::alpha(self.alpha).err()),
-            (
-                "radius",
-                optional(self.radius.map(|radius| radius.to_string())),
-                self.radius.and_then(|radius| ranges::positive(radius).err()),
-            ),
-            ("photons", self.photons.to_string(), ranges::count(self.photons).err()),
-            (
-                "cell-photons",
-                optional(self.cell_photons.map(|count| count.to_string())),
-                self.cell_photons.and_then(|count| ranges::count(count).err()),
-            ),
-            (
-                "max-depth",
-                self.max_depth.to_string(),
-                ranges::count(self.max_depth).err(),
-            ),
-        ];
-        for (flag, value, wrong) in settings {
-            if let Some(wrong) = wrong {
-                return Err(Error::Config(format!("--{flag} {value}: {wrong}")));
-            }
+        in_range(
+            "resolution",
+            format!("{width}x{height}"),
+            ranges::resolution(self.resolution),
+        )?;
+        in_range("alpha", self.alpha, ranges::alpha(self.alpha))?;
+        in_range("photons", self.photons, ranges::count(self.photons))?;
+        in_range("max-depth", self.max_depth, ranges::count(self.max_depth))?;
+        if let Some(radius) = self.radius {
+            in_range("radius", radius, ranges::positive(radius))?;
+        }
+        if let Some(count) = self.cell_photons {
+            in_range("cell-photons", count, ranges::count(count))?;
         }
         Ok(())
     }

@@ -329,6 +329,12 @@ impl StageDesc {
         self
     }
 
+    /// With one specialisation constant more.
+    pub fn constant(mut self, name: &'static str, value: u32) -> Self {
+        self.constants.to_mut().push((name, value));
+        self
+    }
+
     /// With these buffers for the shader's formal parameters.
     pub fn bind(mut self, bound: impl Into<Cow<'static, [(BufferId, BufferId)]>>) -> Self {
         self.bound = bound.into();

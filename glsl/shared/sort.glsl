@@ -1,8 +1,9 @@
 // A stable radix sort of up to 8 bits a pass. A pass counts the digits of each tile (`sort_count`), sums up each digit's counts over
 // the tiles (`sort_rows`) and puts each key into its place (`sort_scatter`).
 
+#include "layout.glsl"
+
 const uint MOST_DIGITS = 256u;
-const uint TILE_KEYS = 2048u;
 
 layout(push_constant) uniform Push {
     uint shift;

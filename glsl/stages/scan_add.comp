@@ -6,8 +6,7 @@
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
-
-const uint BLOCK = 2048u;
+#include "layout.glsl"
 
 layout(push_constant) uniform Push {
     uint count;
@@ -22,7 +21,7 @@ layout(std430) writeonly buffer ScanTotal { uint scan_total; };
 void main() {
     uint me = gl_LocalInvocationID.x;
     uint block = workgroup_index();
-    if (block * BLOCK >= push.count) {
+    if (block * SCAN_BLOCK >= push.count) {
         return;
     }
     uint part = 0u;
@@ -31,8 +30,8 @@ void main() {
     }
     uint before;
     workgroup_exclusive_scan(part, before);
-    uint end = min(block * BLOCK + BLOCK, push.count);
-    for (uint i = block * BLOCK + me; i < end; i += gl_WorkGroupSize.x) {
+    uint end = min(block * SCAN_BLOCK + SCAN_BLOCK, push.count);
+    for (uint i = block * SCAN_BLOCK + me; i < end; i += gl_WorkGroupSize.x) {
         scan[i] += before;
     }
     if (me == 0u && end == push.count) {

@@ -1,13 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Exclusive prefix sums, first of two stages: every workgroup scans a block of 2,048 numbers in place and notes
+// Exclusive prefix sums, first of two stages: every workgroup scans a block of numbers in place and notes
 // the block's sum.
 
 layout(local_size_x = 128) in;
 
 #include "invocation.glsl"
+#include "layout.glsl"
 
-const uint PER_THREAD = 16u;
+const uint PER_THREAD = SCAN_BLOCK / gl_WorkGroupSize.x;
 
 layout(push_constant) uniform Push {
     uint count;

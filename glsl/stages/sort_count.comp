@@ -14,7 +14,7 @@ shared uint counts[MOST_DIGITS];
 
 void main() {
     uint me = gl_LocalInvocationID.x;
-    uint first = workgroup_index() * TILE_KEYS;
+    uint first = workgroup_index() * SORT_TILE;
     // Room for more keys than there are costs nothing.
     if (first >= sort_count) {
         return;
@@ -23,7 +23,7 @@ void main() {
         counts[digit] = 0u;
     }
     barrier();
-    uint end = min(first + TILE_KEYS, sort_count);
+    uint end = min(first + SORT_TILE, sort_count);
     for (uint i = first + me; i < end; i += gl_WorkGroupSize.x) {
         atomicAdd(counts[digit_of(keys_in[i])], 1u);
     }

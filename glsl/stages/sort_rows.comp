@@ -18,7 +18,7 @@ void main() {
     if (digit >= digits()) {
         return;
     }
-    uint tiles = (sort_count + TILE_KEYS - 1u) / TILE_KEYS;
+    uint tiles = (sort_count + SORT_TILE - 1u) / SORT_TILE;
     uint per_thread = (tiles + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x;
     uint first = histogram_of(digit, min(me * per_thread, tiles));
     uint end = histogram_of(digit, min((me + 1u) * per_thread, tiles));

@@ -16,12 +16,12 @@ layout(std430) writeonly buffer ValuesOut { uint values_out[]; };
 
 #include "workgroup_scan.glsl"
 
-const uint PER_THREAD = TILE_KEYS / gl_WorkGroupSize.x;
+const uint PER_THREAD = SORT_TILE / gl_WorkGroupSize.x;
 const uint HALF = 8u; // of the values of four bits
 
 // Digits above, and below them the keys' places in the tile.
 const uint DIGIT_SHIFT = 16u;
-shared uint items[TILE_KEYS];
+shared uint items[SORT_TILE];
 // [value of four bits][thread]: first how many, then where the thread's next one goes; 16 bits each, those of the values from 8 on
 // above those of the first eight. With 32 bits each, more shared memory would be taken than every device has.
 shared uint counts[HALF * gl_WorkGroupSize.x];
@@ -84,12 +84,12 @@ void find_places() {
 
 void main() {
     uint me = gl_LocalInvocationID.x;
-    uint tile = workgroup_index() * TILE_KEYS;
+    uint tile = workgroup_index() * SORT_TILE;
     // Room for more keys than there are costs nothing.
     if (tile >= sort_count) {
         return;
     }
-    uint keys = min(TILE_KEYS, sort_count - tile);
+    uint keys = min(SORT_TILE, sort_count - tile);
     find_places();
     uint mine[PER_THREAD];
     for (uint i = 0u; i < PER_THREAD; i++) {

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use crate::config::RUN_ON_CPU;
+use crate::config::clustered_run;
 use crate::error::Result;
-use crate::gpu::{Compiler, Statistic};
+use crate::gpu::Compiler;
 use crate::scene::SceneFeatures;
 use crate::shaders;
 use crate::stage::{Shader, StageDesc};
@@ -45,22 +45,14 @@ impl CompiledKernel {
 /// A device that isn't there, or whose driver doesn't tell what it compiles to.
 pub fn compiled_kernels(device: Option<&str>, features: SceneFeatures) -> Result<CompiledKernels> {
     let mut compiler = Compiler::open(device)?;
-    let is_processor = compiler.summary().kind == "cpu";
-    let mut constants = vec![
-        ("AIMED", 1),
-        ("ASKS_BEHIND_GLASS", 0),
-        ("RUN", if is_processor { RUN_ON_CPU } else { 1 }),
-    ];
+    let run = clustered_run(compiler.summary().kind);
+    let mut constants = vec![("AIMED", 1), ("ASKS_BEHIND_GLASS", 0), ("RUN", run)];
     constants.extend(features.constants().map(|(name, present)| (name, u32::from(present))));
     let mut compile = |shader: &&'static Shader| {
         let stage = StageDesc::new(shader, 1).constants(constants.clone());
-        let statistics = compiler.statistics(&stage)?;
         Ok(CompiledKernel {
             stage: shader.name,
-            statistics: statistics
-                .into_iter()
-                .map(|Statistic { name, value }| (name, value))
-                .collect(),
+            statistics: compiler.statistics(&stage)?,
         })
     };
     let kernels = shaders::ALL.iter().map(&mut compile).collect::<Result<_>>()?;

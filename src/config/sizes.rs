@@ -3,7 +3,7 @@
 use super::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
     BehindGlass, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, Gloss, GridShape, PathStart, Photon,
-    SHELLS, ShellRadii, Statistics, StatusCounters, TILE, VisiblePoint,
+    SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters, TILE, VisiblePoint,
 };
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
 
@@ -18,13 +18,15 @@ pub const EXHAUSTIVE_RANGE: u32 = 16_000;
 /// Rounds of Lloyd's algorithm for the k-means clusters.
 pub const LLOYD_ROUNDS: u32 = 4;
 /// Visible points that an invocation of `gather_clustered.comp` has on a processor, a divisor of a tile's.
-pub const RUN_ON_CPU: u32 = 8;
+const RUN_ON_CPU: u32 = 8;
+
+/// Visible points that an invocation of `gather_clustered.comp` has on a device of this kind.
+pub fn clustered_run(kind: &str) -> u32 {
+    if kind == "cpu" { RUN_ON_CPU } else { 1 }
+}
+
 /// Radii that the mean of a grid's radii is taken of, about: their sum has to fit a u32.
 const RADIUS_SAMPLES: u32 = 1 << 16;
-/// Numbers of a block of the prefix sum.
-pub const SCAN_BLOCK: u32 = 2048;
-/// Keys of a tile of the radix sort.
-pub const SORT_TILE: u32 = 2048;
 /// Bits of a digit of the radix sort, at the most.
 pub const SORT_DIGIT_BITS: u32 = 8;
 

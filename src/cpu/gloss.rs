@@ -72,12 +72,12 @@ impl Reflector {
         }
     }
 
-    /// What a visible point keeps, and the direction to the viewer.
     /// Whether the material of a visible point is coated: α's sign.
     pub(super) fn is_coated(gloss: &Gloss) -> bool {
         gloss.rest[2] & COATED != 0
     }
 
+    /// What a visible point keeps, and the direction to the viewer.
     pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
         let [f0_rg, f0_b_f90, alpha_coat, over_base] = gloss.rest.map(|word| [half(word), half(word >> 16)]);

@@ -186,9 +186,11 @@ pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
     recording.dispatch(StageDesc::new(&shaders::GRID_PHOTONS, photons).bind(values));
     let runs = sizes.receivers().div_ceil(sizes.clustered_run);
     for [first, end] in parts(sizes) {
-        let mut gather = gather_stage(&shaders::GATHER_CLUSTERED, runs, sizes);
-        gather.constants.to_mut().push(("RUN", sizes.clustered_run));
-        recording.dispatch(gather.push([first, end]));
+        recording.dispatch(
+            gather_stage(&shaders::GATHER_CLUSTERED, runs, sizes)
+                .constant("RUN", sizes.clustered_run)
+                .push([first, end]),
+        );
     }
 }
 

@@ -1,6 +1,7 @@
 //! Prefix sums and sorting, which every ordering on the device is made of.
 
-use crate::config::{SCAN_BLOCK, SORT_DIGIT_BITS, SORT_TILE};
+use crate::config::SORT_DIGIT_BITS;
+use crate::layout::{SCAN_BLOCK, SORT_TILE};
 use crate::record::Recording;
 use crate::shaders;
 use crate::stage::{BufferId, StageDesc};

@@ -286,10 +286,16 @@ impl Instance {
 
     /// Whether a device's driver tells what it compiles kernels to.
     pub fn tells_statistics(&self, device: vk::PhysicalDevice) -> Result<bool> {
+        Ok(has(
+            &self.extensions(device)?,
+            khr::pipeline_executable_properties::NAME,
+        ))
+    }
+
+    fn extensions(&self, device: vk::PhysicalDevice) -> Result<Vec<vk::ExtensionProperties>> {
         // SAFETY: the device is one of this instance's.
-        let extensions = unsafe { self.handle.enumerate_device_extension_properties(device) }
-            .or_vulkan("vkEnumerateDeviceExtensionProperties")?;
-        Ok(has(&extensions, khr::pipeline_executable_properties::NAME))
+        unsafe { self.handle.enumerate_device_extension_properties(device) }
+            .or_vulkan("vkEnumerateDeviceExtensionProperties")
     }
 
     /// A queue family that computes, and its timestamps' valid bits; one without graphics where there is a choice.
@@ -349,10 +355,7 @@ impl Context {
             .queue_priorities(&priorities)];
         // SAFETY: the physical device belongs to the instance, which the context keeps alive.
         unsafe {
-            let extensions = instance
-                .handle
-                .enumerate_device_extension_properties(physical)
-                .or_vulkan("vkEnumerateDeviceExtensionProperties")?;
+            let extensions = instance.extensions(physical)?;
             let mut names = Vec::new();
             // A device that has it (MoltenVK) demands it. None of what such a device may lack is used here.
             if has(&extensions, khr::portability_subset::NAME) {

@@ -4,8 +4,7 @@ use std::collections::HashMap;
 
 use ash::vk;
 
-use super::context::Context;
-use super::context::OrVulkan;
+use super::context::{Context, OrVulkan};
 use super::device::Device;
 use super::pipeline::{Pipeline, descriptor_type};
 use crate::error::{Error, Result};

@@ -17,4 +17,4 @@ pub use context::DeviceSummary;
 pub(crate) use device::advice;
 pub use device::{Device, best_device, devices};
 pub use execute::{Done, Ticket};
-pub use statistics::{Compiler, Statistic};
+pub use statistics::Compiler;

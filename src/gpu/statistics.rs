@@ -10,15 +10,6 @@ use super::pipeline_cache::PipelineCache;
 use crate::error::{Error, Result};
 use crate::stage::StageDesc;
 
-/// A figure of the compiler's.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Statistic {
-    /// As the driver names it.
-    pub name: String,
-    /// Its value.
-    pub value: f64,
-}
-
 /// A device that compiles kernels and runs none.
 pub struct Compiler {
     summary: DeviceSummary,
@@ -60,11 +51,11 @@ impl Compiler {
         &self.summary
     }
 
-    /// What the compiler says of a stage's kernel, in its order.
+    /// What the compiler says of a stage's kernel: figures by the driver's names, in its order.
     ///
     /// # Errors
     /// A kernel that doesn't compile.
-    pub fn statistics(&mut self, stage: &StageDesc) -> Result<Vec<Statistic>> {
+    pub fn statistics(&mut self, stage: &StageDesc) -> Result<Vec<(String, f64)>> {
         let pipeline = self.pipelines.get(&self.context, stage)?;
         let executable = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline.handle);
         // SAFETY: the pipeline is alive, and was created to be asked for its statistics.
@@ -81,10 +72,7 @@ impl Compiler {
                 }
             };
             let name = found.name_as_c_str().unwrap_or_default().to_string_lossy();
-            Statistic {
-                name: name.into_owned(),
-                value,
-            }
+            (name.into_owned(), value)
         };
         Ok(found.iter().map(statistic).collect())
     }

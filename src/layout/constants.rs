@@ -46,6 +46,12 @@ macro_rules! shared_constants {
 }
 
 shared_constants! {
+    /// Numbers of a block of the prefix sum.
+    pub const SCAN_BLOCK: u32 = 2048;
+
+    /// Keys of a tile of the radix sort.
+    pub const SORT_TILE: u32 = 2048;
+
     /// Object of a visible point whose path met no matte surface.
     pub const NO_OBJECT: u32 = u32::MAX;
 

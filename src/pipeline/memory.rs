@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::stages::Stages;
-use crate::config::{Limits, RUN_ON_CPU, RenderConfig, Sizes, Totals, TriangleTest};
+use crate::config::{Limits, RenderConfig, Sizes, Totals, TriangleTest, clustered_run};
 use crate::gpu::DeviceSummary;
 use crate::layout::Settings;
 use crate::scene::PackedScene;
@@ -74,7 +74,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
         storage_buffer_bytes: bindable_bytes(device),
         loop_limit: loop_budget(loop_limit),
         lanes: if device.kind == "cpu" { 4096 } else { 1 << 18 },
-        clustered_run: if device.kind == "cpu" { RUN_ON_CPU } else { 1 },
+        clustered_run: clustered_run(device.kind),
         splitting: scene.features.dielectric || scene.features.glossy,
         specular: scene.features.mirror || scene.features.dielectric,
         glossy: scene.features.glossy,

@@ -147,9 +147,12 @@ impl Stages<'_> {
 
     /// What they see of the lights, and whether they ask for lights behind glass.
     fn direct(&self, turn: CameraTurn, asks: bool, recording: &mut Recording) {
-        let mut direct = self.ray_stage(&shaders::DIRECT, self.sizes.slots());
-        direct.constants.to_mut().push(("ASKS_BEHIND_GLASS", u32::from(asks)));
-        recording.dispatch(direct.push(turn.words()).bind(vec![sums_of(turn.iteration)]));
+        recording.dispatch(
+            self.ray_stage(&shaders::DIRECT, self.sizes.slots())
+                .constant("ASKS_BEHIND_GLASS", u32::from(asks))
+                .push(turn.words())
+                .bind(vec![sums_of(turn.iteration)]),
+        );
     }
 
     /// The radii that the visible points gather within, and the grids that suit them.
