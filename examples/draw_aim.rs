@@ -18,8 +18,9 @@ use ppm_vk::emission::Table;
 use ppm_vk::film::write_rgb8;
 use ppm_vk::gpu::Device;
 use ppm_vk::layout::{DIRECTIONAL_LIGHT, EmissionCell, Light};
+use ppm_vk::packing::PackedScene;
 use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::scene::Scene;
 
 /// Pixels of a panel's side.
 const SIDE: usize = 256;

@@ -7,9 +7,12 @@ use crate::error::Result;
 use crate::film::Image;
 use crate::layout::{BehindGlass, Settings};
 use crate::metrics;
+use crate::packing::PackedScene;
 use crate::radius::{MOST_FOOTPRINTS, PILOT_FOOTPRINTS};
 use crate::record::Run;
-use crate::scene::{Camera, Lens, PackedScene, Projection};
+use crate::scene::Camera;
+use crate::scene::Lens;
+use crate::scene::Projection;
 
 /// A progressive render that is under way.
 pub trait Backend {

@@ -24,7 +24,7 @@ use crate::backend::{Backend, Resolved};
 use crate::config::{Estimator, RenderConfig, SEQUENCES};
 use crate::film::Image;
 use crate::metrics::floor_of;
-use crate::scene::PackedScene;
+use crate::packing::PackedScene;
 use parts::{OfPixel, Parts};
 use spread::{Spread, Weights};
 

@@ -2,7 +2,7 @@
 //!
 //! # The life of a pass
 //!
-//! [`scene::Scene::load`] reads a file, [`scene::PackedScene`] lays it out for the device. [`pipeline::Renderer`] uploads
+//! [`scene::Scene::load`] reads a file, [`packing::PackedScene`] lays it out for the device. [`pipeline::Renderer`] uploads
 //! it and then repeats iterations, whose stages [`pipeline::Stages::iteration`] lists: `camera` finds visible points,
 //! `emission` starts photon paths, `photons` traces them, a method of [`gather::METHODS`] finds each visible point's
 //! photons, `direct` samples the lights, `update` shrinks the radii (the paper's equations 2 and 3). `resolve` makes the
@@ -27,7 +27,9 @@ pub mod film;
 pub mod gather;
 pub mod gpu;
 pub mod layout;
+pub mod loader;
 pub mod metrics;
+pub mod packing;
 pub mod pipeline;
 pub mod radius;
 pub mod random;

@@ -28,11 +28,11 @@ pub enum BufferId {
     Texels,
     /// [`crate::layout::Light`]s.
     Lights,
-    /// Spheres in which a light is near, centre and squared radius: see `scene/near_lights.rs`.
+    /// Spheres in which a light is near, centre and squared radius: see `packing/near_lights.rs`.
     NearLights,
     /// [`crate::layout::LightSource`]s.
     LightSources,
-    /// Names of the media that each light is in: see `scene/immersion.rs`.
+    /// Names of the media that each light is in: see `packing/immersion.rs`.
     MediaOfLights,
     /// What shines from afar, and how directions are chosen from it; see `glsl/shared/environment.glsl`.
     Environment,

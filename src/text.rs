@@ -32,6 +32,35 @@ fn is_hidden(character: char) -> bool {
         || matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
+/// How many items a list in a message spells out.
+const MAX_LISTED: usize = 8;
+
+/// Characters of a name or URI that are kept: a file may hold megabytes of them, and repeat them per instance.
+const MAX_NAME: usize = 120;
+
+/// `name`, cut where it is longer than any sensible name.
+pub(crate) fn shorten(name: &str) -> String {
+    match name.char_indices().nth(MAX_NAME) {
+        Some((end, _)) => format!("{}…", &name[..end]),
+        None => name.to_owned(),
+    }
+}
+
+/// `name` in quotation marks, with line ends and control characters escaped.
+pub(crate) fn quote(name: &str) -> String {
+    format!("{:?}", shorten(name))
+}
+
+/// `a, b and c`, or the first few `and 5 more`.
+pub(crate) fn list(items: &[String]) -> String {
+    let (shown, rest) = items.split_at(items.len().min(MAX_LISTED));
+    match (shown, rest.len()) {
+        ([head @ .., last], 0) if !head.is_empty() => format!("{} and {last}", head.join(", ")),
+        (shown, 0) => shown.join(", "),
+        (shown, more) => format!("{} and {more} more", shown.join(", ")),
+    }
+}
+
 /// A number of bytes with three digits or so: one that isn't 0 isn't told as 0.
 pub fn bytes(count: u64) -> String {
     match count {

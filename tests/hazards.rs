@@ -3,9 +3,9 @@
 
 use ppm_vk::config::{Limits, RenderConfig, Sizes};
 use ppm_vk::gather::METHODS;
+use ppm_vk::packing::SceneFeatures;
 use ppm_vk::pipeline::Stages;
 use ppm_vk::record::{Command, Recording};
-use ppm_vk::scene::SceneFeatures;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 

@@ -120,6 +120,30 @@ fn imports_go_downward() {
         (
             "scene",
             &[
+                "crate::loader",
+                "crate::packing",
+                "crate::gpu",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+                "crate::record",
+            ],
+        ),
+        (
+            "loader",
+            &[
+                "crate::packing",
+                "crate::gpu",
+                "crate::pipeline",
+                "crate::cli",
+                "crate::cpu",
+                "crate::record",
+            ],
+        ),
+        (
+            "packing",
+            &[
+                "crate::loader",
                 "crate::gpu",
                 "crate::pipeline",
                 "crate::cli",

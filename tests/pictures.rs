@@ -9,7 +9,7 @@ use ppm_vk::config::{Accel, Direct, RenderConfig};
 use ppm_vk::gather;
 use ppm_vk::gpu::Device;
 use ppm_vk::metrics::{Defects, compare, defects};
-use ppm_vk::scene::SceneFeatures;
+use ppm_vk::packing::SceneFeatures;
 
 use picture::{Subject, reference, small};
 

@@ -2,7 +2,7 @@
 
 #include "layout.glsl"
 
-// What the scene has, see scene::SceneFeatures: there is no code for the rest.
+// What the scene has, see packing::SceneFeatures: there is no code for the rest.
 layout(constant_id = 6) const bool MIRRORS = true;
 layout(constant_id = 7) const bool DIELECTRICS = true;
 layout(constant_id = 8) const bool CONTACT = true;
@@ -61,7 +61,7 @@ bool is_mirrored(Instance instance) {
     return (instance.flags & MIRRORED) != 0u;
 }
 
-// Where a map puts a point: the same for all triangles that share a corner, and `Placement::point` in src/scene.
+// Where a map puts a point: the same for all triangles that share a corner, and `Placement::point` in src/scene/placement.rs.
 vec3 placed(mat3x4 rows, vec3 p) {
     precise vec3 result = vec3(rows[0].x * p.x + rows[0].y * p.y + rows[0].z * p.z + rows[0].w,
                                rows[1].x * p.x + rows[1].y * p.y + rows[1].z * p.z + rows[1].w,

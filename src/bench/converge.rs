@@ -12,8 +12,9 @@ use crate::estimate::{ErrorEstimate, of_one_photon};
 use crate::film::Image;
 use crate::gpu::Device;
 use crate::metrics::compare;
+use crate::packing::PackedScene;
 use crate::pipeline::Renderer;
-use crate::scene::{Camera, PackedScene};
+use crate::scene::Camera;
 
 /// Iterations before which errors aren't taken for the fit: the radius has hardly moved.
 const FIRST_FITTED: u32 = 4;

@@ -9,8 +9,10 @@ use crate::backend::{Backend, DeviceDescription};
 use crate::config::RenderConfig;
 use crate::error::Result;
 use crate::gpu::Device;
+use crate::packing::PackedScene;
+use crate::packing::SceneFeatures;
 use crate::pipeline::Renderer;
-use crate::scene::{Camera, PackedScene, SceneFeatures};
+use crate::scene::Camera;
 
 /// Times of all sets of features.
 #[derive(Debug, Clone, Serialize)]

@@ -15,9 +15,10 @@ use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, Tests, is_gather_stage};
 use crate::gpu::Device;
 use crate::layout::{GATHERED_FOR, GROUP, Gathered, NO_OBJECT, Photon, Settings, VisiblePoint};
+use crate::packing::PackedScene;
 use crate::pipeline::Renderer;
 use crate::record::Run;
-use crate::scene::{Camera, PackedScene};
+use crate::scene::Camera;
 use crate::stage::BufferId;
 
 /// Microseconds that one gather may take; a slower method is measured on a share of the visible points.

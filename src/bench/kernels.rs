@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::config::clustered_run;
 use crate::error::Result;
 use crate::gpu::Compiler;
-use crate::scene::SceneFeatures;
+use crate::packing::SceneFeatures;
 use crate::shaders;
 use crate::stage::{Shader, StageDesc};
 

@@ -14,7 +14,9 @@ use crate::bench::{self, GatherBench};
 use crate::config::{EmissionChoice, Probe, RenderConfig};
 use crate::film::{write_png, write_whole};
 use crate::gather::{METHODS, method};
-use crate::scene::{PackedScene, Scene, SceneFeatures};
+use crate::packing::PackedScene;
+use crate::packing::SceneFeatures;
+use crate::scene::Scene;
 
 /// What is measured where the user names no scene.
 const CORNELL: [(&str, &[u8]); 2] = [

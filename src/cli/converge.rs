@@ -13,7 +13,7 @@ use crate::bench::{Converge, Curve, converge, converge_table, csv, plot_converge
 use crate::config::{Direct, EmissionChoice, Estimator, RenderConfig, Sampler};
 use crate::film::{read_exr, write_whole};
 use crate::gather::METHODS;
-use crate::scene::PackedScene;
+use crate::packing::PackedScene;
 
 /// `ppm-vk converge`.
 #[derive(Debug, Args)]

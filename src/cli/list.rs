@@ -12,8 +12,10 @@ use super::scene::SceneArguments;
 use crate::config::RenderConfig;
 use crate::gather::{METHODS, default_method};
 use crate::gpu;
+use crate::packing::PackedScene;
 use crate::pipeline::Memory;
-use crate::scene::{PackedScene, Scene, Surface};
+use crate::scene::Scene;
+use crate::scene::Surface;
 use crate::text::escaped;
 
 /// `ppm-vk devices`.

@@ -20,9 +20,10 @@ use crate::files::Writing;
 use crate::film::{self, Image, Metadata};
 use crate::gather::{self, METHODS, Runs};
 use crate::gpu::Device;
+use crate::packing::PackedScene;
 use crate::pipeline::Renderer;
 use crate::report::Subject;
-use crate::scene::{Camera, PackedScene};
+use crate::scene::Camera;
 
 /// Width of a picture without --resolution.
 const DEFAULT_WIDTH: u32 = RenderConfig::DEFAULT.resolution[0];

@@ -8,7 +8,11 @@ use clap::Args;
 use super::args::{number, positive};
 use super::progress::{READING, while_showing};
 use crate::error::Error;
-use crate::scene::{Environment, LightUnits, LoadOptions, MEMORY_LIMIT, Scene};
+use crate::loader::LightUnits;
+use crate::loader::LoadOptions;
+use crate::loader::MEMORY_LIMIT;
+use crate::scene::Environment;
+use crate::scene::Scene;
 
 /// How a scene's file is read.
 #[derive(Debug, Args)]

@@ -16,8 +16,8 @@ use super::vector::rgb;
 use crate::alias::Choice;
 use crate::emission::{Table, light_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, NARROW_CONE, POINT_LIGHT, SPOT_LIGHT, WIDE_CONE};
+use crate::packing::Sphere;
 use crate::random::Random;
-use crate::scene::Sphere;
 
 #[cfg(test)]
 mod tests;

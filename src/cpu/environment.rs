@@ -27,7 +27,7 @@ pub(super) struct Environment<'a> {
 }
 
 impl<'a> Environment<'a> {
-    /// Reads [`crate::scene::PackedScene::environment`].
+    /// Reads [`crate::packing::PackedScene::environment`].
     pub fn of(table: &'a [[f32; 4]]) -> Self {
         let [width, height] = [0, 1].map(|side| table[0][side].to_bits() as usize);
         let (rows, pixels) = table[1..].split_at(height);

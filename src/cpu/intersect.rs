@@ -8,7 +8,8 @@ use super::Inputs;
 use super::vector::{word, xyz};
 use crate::config::Accel;
 use crate::layout::{BvhRecord, LEAF, PLACEMENT_RECORD};
-use crate::scene::{PackedScene, Placement};
+use crate::packing::PackedScene;
+use crate::scene::Placement;
 
 /// Of a distance, that rounding may change.
 const TIE: f64 = 1e-9;

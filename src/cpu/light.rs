@@ -10,7 +10,7 @@ use super::surface::Surface;
 use super::vector::rgb;
 use crate::alias::{self, AliasCell};
 use crate::layout::{BACK_EMITS, DIRECTIONAL_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT};
-use crate::scene::Part;
+use crate::packing::Part;
 
 /// By the alias method, with the digits of `u` in [0, 1) and of two more numbers below it.
 pub(super) fn choose_light(lights: &[Light], u: f64, digits: [f64; 2]) -> alias::Choice {
@@ -146,8 +146,8 @@ pub(super) fn soft_light_along(light: &Light, origin: DVec3, direction: DVec3) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::packing::set_alias_table;
     use crate::random::{PathKind, Random};
-    use crate::scene::set_alias_table;
     use bytemuck::Zeroable;
 
     /// A light of one choice in 10¹² has its turn as often: choices near it are enumerated, all others can't be it.

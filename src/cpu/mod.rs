@@ -57,7 +57,7 @@ pub use update::{GatheredWith, fit_radius, radii, reset, update};
 use crate::config::RenderConfig;
 use crate::emission::Table;
 use crate::layout::Settings;
-use crate::scene::PackedScene;
+use crate::packing::PackedScene;
 
 /// A ray's limit where it has none; nothing lies so far, for the scene is 2 long.
 const FAR: f64 = 1e30;

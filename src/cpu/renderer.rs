@@ -15,10 +15,11 @@ use crate::emission::{Aim, is_learned_from};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
 use crate::layout::{Coverage, DirectSum, Gathered, Settings, Statistics};
+use crate::packing::PackedScene;
 use crate::radius;
 use crate::random::CameraTurn;
 use crate::record::{Launch, Run};
-use crate::scene::{Camera, PackedScene};
+use crate::scene::Camera;
 
 /// Lanes that a batch's photon paths are dealt to, whatever the number of threads. As many as on a CPU's Vulkan
 /// device, so that both give the photons in the same order.

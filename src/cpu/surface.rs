@@ -10,7 +10,7 @@ use super::intersect::{Hit, PlacedTriangle};
 use super::sampling::decode_direction;
 use super::vector::{rgb, word};
 use crate::layout::{COAT_F0, DIELECTRIC, GLOSSY_SURFACE, Material, RANK, ROUNDINGS, SMOOTH_SHADED, ShadingTriangle};
-use crate::scene::PackedScene;
+use crate::packing::PackedScene;
 
 /// A point of a triangle.
 #[derive(Clone, Copy)]

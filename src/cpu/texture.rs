@@ -10,8 +10,8 @@ use super::sampling::decode_direction;
 use super::surface::{Surface, surface_of};
 use super::vector::rgb;
 use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED_TRIANGLE};
+use crate::packing::PackedScene;
 use crate::random::Random;
-use crate::scene::PackedScene;
 
 /// What a place of a triangle has for textures.
 struct Place {

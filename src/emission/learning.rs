@@ -10,9 +10,9 @@ use super::targets::targets;
 use crate::alias::alias_table;
 use crate::config::{MOST_EMISSION_CELLS, RenderConfig};
 use crate::layout::{EmissionCell, VisiblePoint};
+use crate::packing::PackedScene;
 use crate::radius;
 use crate::random::Random;
-use crate::scene::PackedScene;
 
 /// Rounds of learning before the first iteration, each of a quarter of its paths.
 const PILOT_ROUNDS: u32 = 4;

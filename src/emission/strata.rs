@@ -7,7 +7,9 @@ use glam::{DVec3, Vec3};
 
 use super::targets::{Targets, corners_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
-use crate::scene::{PackedScene, Part, Sphere};
+use crate::packing::PackedScene;
+use crate::packing::Part;
+use crate::packing::Sphere;
 
 /// Of a stratum's share of the power, what its probability is at least: no photon carries much more than by power.
 const FLOOR: f64 = 0.2;

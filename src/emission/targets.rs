@@ -10,7 +10,9 @@ use crate::layout::{
     DIELECTRIC, FOLLOWED_ALPHA, GLOSSY_SURFACE, Light, MIRROR, Material, NO_OBJECT, POINT_LIGHT, SPOT_LIGHT,
     ShadingTriangle, VisiblePoint,
 };
-use crate::scene::{PackedScene, Placement, Sphere};
+use crate::packing::PackedScene;
+use crate::packing::Sphere;
+use crate::scene::Placement;
 
 /// Spheres around specular objects at the most.
 const MOST_SPECULAR: usize = 12;

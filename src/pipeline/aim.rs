@@ -8,7 +8,7 @@ use crate::emission::{Aim, Table, counted_paths};
 use crate::error::Result;
 use crate::film::Image;
 use crate::layout::VisiblePoint;
-use crate::scene::PackedScene;
+use crate::packing::PackedScene;
 use crate::stage::BufferId;
 
 impl Renderer {

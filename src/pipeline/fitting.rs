@@ -7,8 +7,8 @@ use super::stages::Stages;
 use crate::config::{Limits, RenderConfig, Sizes, Totals};
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceSummary, advice};
+use crate::packing::PackedScene;
 use crate::record::{Command, Recording};
-use crate::scene::PackedScene;
 use crate::stage::{Access, BufferId};
 use crate::text;
 

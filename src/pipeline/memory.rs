@@ -6,7 +6,7 @@ use super::stages::Stages;
 use crate::config::{Limits, RenderConfig, Sizes, Totals, TriangleTest, clustered_run};
 use crate::gpu::DeviceSummary;
 use crate::layout::Settings;
-use crate::scene::PackedScene;
+use crate::packing::PackedScene;
 use crate::stage::BufferId;
 
 /// Bytes of a device's memory.

@@ -20,9 +20,12 @@ use crate::error::{Error, Result};
 use crate::gather::{METHODS, default_method, grid_sizes};
 use crate::gpu::Device;
 use crate::layout::{Settings, StatusCounters};
+use crate::packing::IN_VACUUM;
+use crate::packing::PackedScene;
+use crate::packing::SceneFeatures;
 use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
-use crate::scene::{Camera, IN_VACUUM, PackedScene, SceneFeatures};
+use crate::scene::Camera;
 use crate::stage::{BufferId, SEQUENCE_FILMS};
 use stages::{method_stages, reporting};
 

@@ -5,9 +5,9 @@ use super::stages::reporting;
 use crate::backend::Counters;
 use crate::error::Result;
 use crate::layout::{Photon, Statistics, VisiblePoint};
+use crate::packing::PackedScene;
 use crate::random::CameraTurn;
 use crate::record::Recording;
-use crate::scene::PackedScene;
 use crate::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
 use crate::{radius, shaders};
 

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use crate::config::{Accel, Direct, Estimator, RenderConfig, SEQUENCES, Sizes, Totals, TriangleTest, iterations_of};
 use crate::gather::{METHODS, Record, default_method, grid_sizes, scan};
+use crate::packing::SceneFeatures;
 use crate::random::CameraTurn;
 use crate::record::Recording;
-use crate::scene::SceneFeatures;
 use crate::shaders;
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS, Shader, StageDesc};
 

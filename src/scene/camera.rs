@@ -3,14 +3,10 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec2, Vec3};
-use gltf::json::camera::{Orthographic, Perspective, Type};
-use gltf::json::validation::Checked;
-use gltf::json::{self, Root};
 
-use super::diagnostic::{Check, Warnings, damaged, label, list, quote, shorten};
-use super::graph::{PlacedNode, node_label};
-use super::{Camera, Lens, Normalisation, Projection, Scene};
+use super::Scene;
 use crate::error::{Error, Result};
+use crate::text::{list, quote};
 
 /// Vertical angle of view of the camera that is framed on the bounds, in radians.
 const FRAMED_FOV: f64 = 40.0 * PI / 180.0;
@@ -24,132 +20,62 @@ const LARGEST_LENS: f64 = 100.0;
 /// Radius of a lens over its distance to what is in focus at the most: its rays would be nearly perpendicular to its axis.
 const WIDEST_LENS: f64 = 100.0;
 
+/// Free space around the bounds in its picture, as a factor of its distance.
+const FRAMED_MARGIN: f64 = 1.05;
+
 /// Distances of what is sharp, in render units: nothing nearer is seen, and what is farther is as sharp as what is there.
 const NEAREST_FOCUS: f32 = 1e-9;
 const FARTHEST_FOCUS: f32 = 1e9;
 
-/// Free space around the bounds in its picture, as a factor of its distance.
-const FRAMED_MARGIN: f64 = 1.05;
-
-/// The cameras of the nodes, in render space.
-pub(super) fn cameras(
-    root: &Root,
-    nodes: &[PlacedNode<'_>],
-    normalisation: Normalisation,
-    warnings: &mut Warnings,
-) -> Check<Vec<Camera>> {
-    let mut cameras = Vec::new();
-    for placed in nodes {
-        let Some(index) = placed.node.camera else {
-            continue;
-        };
-        let index = index.value();
-        let camera = root.cameras.get(index).ok_or_else(|| {
-            damaged(format_args!(
-                "{}: there is no camera {index}, the file has {}",
-                node_label(root, placed.index),
-                root.cameras.len()
-            ))
-        })?;
-        let label = label("camera", index, camera.name.as_deref());
-        let (projection, aspect) = projection(camera, normalisation).map_err(|what| format!("{label}: {what}"))?;
-        let name = match camera.name.as_deref().or(placed.node.name.as_deref()) {
-            Some(name) => shorten(name),
-            None => format!("camera {}", cameras.len()),
-        };
-        match place(name, (projection, aspect), placed, normalisation).map_err(|what| format!("{label}: {what}"))? {
-            Some(camera) => cameras.push(camera),
-            None => warnings.push(format!(
-                "{label}: {} leaves it no direction (a scale of zero), and it is skipped",
-                node_label(root, placed.index)
-            )),
-        }
-    }
-    Ok(cameras)
+/// What a camera's picture shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// What lies within an angle.
+    Perspective {
+        /// Tangent of half the vertical angle of view.
+        tan_half_fov: f32,
+    },
+    /// What lies within a height.
+    Orthographic {
+        /// Half of it, in render units.
+        half_height: f32,
+    },
 }
 
-/// What the camera shows, and width over height where the file gives it. Clipping planes play no part.
-fn projection(camera: &json::Camera, normalisation: Normalisation) -> Check<(Projection, Option<f32>)> {
-    match camera.type_ {
-        Checked::Valid(Type::Orthographic) => match &camera.orthographic {
-            Some(orthographic) => of_orthographic(orthographic, normalisation),
-            None => Err(damaged("its type is orthographic, but it has no such projection")),
-        },
-        Checked::Valid(Type::Perspective) => match &camera.perspective {
-            Some(perspective) => of_perspective(perspective),
-            None => Err(damaged("its type is perspective, but it has no such projection")),
-        },
-        Checked::Invalid => Err(damaged("its type is neither perspective nor orthographic")),
-    }
+/// What makes things out of focus blurred.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// Its radius, in render units.
+    pub radius: f32,
+    /// Distance along the direction of view of what is in focus, in render units.
+    pub focus: f32,
 }
 
-fn of_perspective(perspective: &Perspective) -> Check<(Projection, Option<f32>)> {
-    let fov = f64::from(perspective.yfov);
-    let tan_half_fov = (0.5 * fov).tan() as f32;
-    // An angle near zero has a tangent that f32 can't hold.
-    if !(fov > 0.0 && fov < PI && tan_half_fov.is_normal()) {
-        return Err(format!(
-            "its yfov is {fov}, but it must lie between 0 and π; correct it in the file"
-        ));
-    }
-    if let Some(aspect) = perspective.aspect_ratio
-        && !(aspect > 0.0 && aspect.is_normal())
-    {
-        return Err(format!(
-            "its aspectRatio is {aspect}, but it must be positive; correct it in the file"
-        ));
-    }
-    Ok((Projection::Perspective { tan_half_fov }, perspective.aspect_ratio))
-}
-
-/// Negative magnifications, which the specification discourages, are taken by their size.
-fn of_orthographic(orthographic: &Orthographic, normalisation: Normalisation) -> Check<(Projection, Option<f32>)> {
-    let [width, height] = [orthographic.xmag, orthographic.ymag].map(f32::abs);
-    let half_height = (f64::from(height) * normalisation.scale) as f32;
-    let aspect = width / height;
-    if !(half_height.is_normal() && aspect.is_normal()) {
-        return Err(format!(
-            "its xmag is {} and its ymag {}, but neither may be 0 or infinite; correct them in the file",
-            orthographic.xmag, orthographic.ymag
-        ));
-    }
-    Ok((Projection::Orthographic { half_height }, Some(aspect)))
-}
-
-/// The camera at a node; `None` if the node's transform leaves it no direction.
-///
-/// Lengths of axes are ignored. Ancestors that mirror turn the direction of view with the scene, but the picture stays
-/// right-handed: that is what splitting the global transform into translation, rotation and scale gives.
-fn place(
-    name: String,
-    (projection, aspect): (Projection, Option<f32>),
-    placed: &PlacedNode<'_>,
-    normalisation: Normalisation,
-) -> Check<Option<Camera>> {
-    let to_world = placed.unscaled_to_world;
-    let position = normalisation.to_render(to_world.translation);
-    if !position.is_finite() {
-        return Err("it is too far from the scene; correct the translation of its node".into());
-    }
-    let Some(frame) = frame(-to_world.matrix3.z_axis, to_world.matrix3.y_axis) else {
-        return Ok(None);
-    };
-    let [right, up, forward] = frame.map(|axis| axis.as_vec3());
-    Ok(Some(Camera {
-        name,
-        position,
-        right,
-        up,
-        forward,
-        projection,
-        aspect,
-        lens: None,
-        shift: Vec2::ZERO,
-    }))
+/// A camera in render space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Name in the file, or `camera N`.
+    pub name: String,
+    /// Centre of projection.
+    pub position: Vec3,
+    /// Unit vector to the picture's right.
+    pub right: Vec3,
+    /// Unit vector to the picture's top.
+    pub up: Vec3,
+    /// Unit vector into the picture.
+    pub forward: Vec3,
+    /// What it shows.
+    pub projection: Projection,
+    /// Width over height where the file gives it.
+    pub aspect: Option<f32>,
+    /// Its lens; a pinhole has none.
+    pub lens: Option<Lens>,
+    /// How far the film is moved to the right and up, in parts of its larger side.
+    pub shift: Vec2,
 }
 
 /// Orthonormal right, up and forward from a direction of view and an up direction that need be neither.
-fn frame(forward: DVec3, up: DVec3) -> Option<[DVec3; 3]> {
+pub(crate) fn frame(forward: DVec3, up: DVec3) -> Option<[DVec3; 3]> {
     let forward = forward.try_normalize()?;
     let right = forward.cross(up.try_normalize()?).try_normalize()?;
     Some([right, right.cross(forward), forward])
@@ -157,7 +83,7 @@ fn frame(forward: DVec3, up: DVec3) -> Option<[DVec3; 3]> {
 
 /// A camera that looks at the centre of the bounds along −Z and slightly down, from where it sees all of them in any
 /// picture that is no higher than wide.
-pub(super) fn framed_on((lower, upper): (Vec3, Vec3)) -> Camera {
+pub(crate) fn framed_on((lower, upper): (Vec3, Vec3)) -> Camera {
     let (sin, cos) = FRAMED_PITCH.sin_cos();
     let forward = DVec3::new(0.0, -sin, -cos);
     let right = DVec3::X;

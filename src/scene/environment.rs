@@ -15,9 +15,6 @@ use crate::text::bytes;
 /// Pixels that a picture is reduced to: as many as one buffer of every device holds.
 const MAX_PIXELS: usize = 1 << 22;
 
-/// The part of all choices of a direction that goes by solid angle alone, so that what is dim has its turn.
-const UNIFORM: f64 = 0.1;
-
 /// Radiance from each direction, never black all over.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {
@@ -116,12 +113,12 @@ impl Environment {
     }
 
     /// Bytes that it takes.
-    pub(super) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         size_of_val(self.image.pixels()) as u64
     }
 
     /// What was done to the picture to have it rendered, one line each.
-    pub(super) fn warnings(&self) -> Vec<String> {
+    pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.replaced > 0 {
             warnings.push(format!(
@@ -140,13 +137,23 @@ impl Environment {
         warnings
     }
 
+    /// The picture.
+    pub(crate) fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// How far it is rotated about +Y, in turns, 0 ..= 1.
+    pub(crate) fn rotation(&self) -> f64 {
+        self.rotation
+    }
+
     /// Pixels, width and height; 1 × 1 where there is one radiance.
     pub fn size(&self) -> [usize; 2] {
         [self.image.width(), self.image.height()]
     }
 
     /// Mean of the RGB radiance, integrated over all directions.
-    pub(super) fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         let weights = self.weights();
         let rows = weights.chunks(self.image.width()).enumerate();
         rows.map(|(row, weights)| weights.iter().sum::<f64>() * self.solid_angle(row))
@@ -154,7 +161,7 @@ impl Environment {
     }
 
     /// About the part of all directions that the light comes from: 1 where it comes from all alike.
-    pub(super) fn spread(&self) -> f64 {
+    pub(crate) fn spread(&self) -> f64 {
         let weights = self.weights();
         let rows = weights.chunks(self.image.width()).enumerate();
         let squares: f64 = rows
@@ -163,38 +170,8 @@ impl Environment {
         self.total().powi(2) / (4.0 * PI * squares)
     }
 
-    /// The picture with the probabilities by which directions are chosen, as `glsl/shared/environment.glsl` reads it: the
-    /// size, and the rotation in turns; of each row the cosines at its upper and lower edge; the pixels. w: of rows and of a row's pixels, the
-    /// probability of each and those before it.
-    pub(crate) fn table(&self) -> Vec<[f32; 4]> {
-        let [width, height] = self.size();
-        let weights = self.weights();
-        let mean = self.total() / (4.0 * PI);
-        let density = |weight: f64| (1.0 - UNIFORM) * weight + UNIFORM * mean;
-        let rows: Vec<Vec<f32>> = weights
-            .chunks(width)
-            .map(|weights| cumulative(&weights.iter().map(|&weight| density(weight)).collect::<Vec<_>>()))
-            .collect();
-        let of_rows = weights.chunks(width).enumerate().map(|(row, weights)| {
-            let sum: f64 = weights.iter().map(|&weight| density(weight)).sum();
-            sum * self.solid_angle(row)
-        });
-        let edge = |row: usize| (PI * row as f64 / height as f64).cos() as f32;
-        let size = [width, height].map(|side| f32::from_bits(side as u32));
-        let mut table = vec![[size[0], size[1], self.rotation as f32, 0.0]];
-        let sums = cumulative(&of_rows.collect::<Vec<_>>());
-        table.extend(
-            sums.iter()
-                .enumerate()
-                .map(|(row, &sum)| [edge(row), edge(row + 1), 0.0, sum]),
-        );
-        let pixels = self.image.pixels().iter().zip(rows.iter().flatten());
-        table.extend(pixels.map(|(&[r, g, b], &sum)| [r, g, b, sum]));
-        table
-    }
-
     /// Solid angle of a pixel of a row.
-    fn solid_angle(&self, row: usize) -> f64 {
+    pub(crate) fn solid_angle(&self, row: usize) -> f64 {
         let [width, height] = self.size();
         let edge = |row: usize| (PI * row as f64 / height as f64).cos();
         2.0 * PI / width as f64 * (edge(row) - edge(row + 1))
@@ -202,7 +179,7 @@ impl Environment {
 
     /// Mean over each pixel of the interpolated radiance, itself the mean of RGB: of a pixel and its neighbours in a row and
     /// a column, 1/8, 6/8 and 1/8.
-    fn weights(&self) -> Vec<f64> {
+    pub(crate) fn weights(&self) -> Vec<f64> {
         let [width, height] = self.size();
         let pixels = self.image.pixels();
         let mean = |x: usize, y: usize| DVec3::from(pixels[y * width + x].map(f64::from)).element_sum() / 3.0;
@@ -238,33 +215,6 @@ fn check_size(path: &Path, pixels: u64, memory_limit: u64) -> Result<()> {
             needed.div_ceil(1 << 30)
         ),
     ))
-}
-
-/// A table of no light, for scenes without an environment.
-pub(super) fn no_table() -> Vec<[f32; 4]> {
-    vec![
-        [f32::from_bits(1), f32::from_bits(1), 0.0, 0.0],
-        [1.0, -1.0, 0.0, 1.0],
-        [0.0, 0.0, 0.0, 1.0],
-    ]
-}
-
-/// Parts of the sum up to and with each value, in multiples of 2⁻²⁴, as random numbers are. Each value has one of them at
-/// the least, so that none is left out: what is chosen more often than it should be counts less in return.
-fn cumulative(values: &[f64]) -> Vec<f32> {
-    const STEPS: f64 = (1 << 24) as f64;
-    let total: f64 = values.iter().sum();
-    let mut sum = 0.0;
-    let mut before = 0.0;
-    let sums = values.iter().zip((0..values.len()).rev()).map(|(value, after)| {
-        sum += value;
-        before = (sum / total * STEPS)
-            .round()
-            .max(before + 1.0)
-            .min(STEPS - after as f64);
-        (before / STEPS) as f32
-    });
-    sums.collect()
 }
 
 /// The picture with fewer pixels, each the mean of what it stands for; values that are no radiance are 0.
@@ -351,15 +301,5 @@ mod tests {
             let error = environment.clone().scaled(strength).expect_err("no radiance");
             assert!(error.contains("another strength"), "{error}");
         }
-    }
-
-    #[test]
-    fn every_pixel_can_be_chosen() {
-        let mut values = vec![1e-30; 5000];
-        values[0] = 1.0;
-        values[2500] = 1.0;
-        let sums = cumulative(&values);
-        assert_eq!(sums.last(), Some(&1.0));
-        assert!(sums.windows(2).all(|pair| pair[0] < pair[1]));
     }
 }

@@ -1,24 +1,66 @@
-//! Area lights: the triangles whose material emits.
+//! Lights: those that are points or directions (`KHR_lights_punctual`), and objects whose material emits.
 
 use std::f64::consts::PI;
 
-use super::shine::Shine;
+use glam::Vec3;
+
 use super::{Object, Scene};
 
-/// A triangle that emits light.
+/// How a punctual light shines.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EmissiveTriangle {
-    /// Index into [`Scene::triangles`].
-    pub triangle: u32,
-    /// Its area, in square render units.
-    pub area: f64,
-    /// Emitted power: mean of the RGB radiance × π × area, twice that if both sides emit. Always positive.
-    pub power: f64,
+pub enum Emission {
+    /// In all directions.
+    Point,
+    /// Around an axis, all of it up to the inner angle, then less, and nothing past the outer angle.
+    Spot {
+        /// Unit vector along the axis.
+        direction: Vec3,
+        /// 1 − cos of the inner angle.
+        inner: f64,
+        /// 1 − cos of the outer angle, larger than `inner`.
+        outer: f64,
+    },
+    /// Along parallel rays, from infinitely far.
+    Directional {
+        /// Unit vector along the rays.
+        direction: Vec3,
+    },
+}
+
+/// A light that is no surface, in render space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PunctualLight {
+    /// How it shines.
+    pub emission: Emission,
+    /// Where it is; of no meaning where its rays are parallel.
+    pub position: Vec3,
+    /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB. Never black.
+    pub intensity: Vec3,
+    /// How large it is: the radius of a point or spot, in render units, which is seen as a ball of it; half of the angle that a
+    /// directional one takes up, in radians. 0 where it has no extent.
+    pub extent: f64,
+    /// Point, spot: the distance that it reaches, in render units; `None` where it reaches any.
+    pub range: Option<f64>,
+}
+
+impl PunctualLight {
+    /// Emitted power: mean of the RGB intensity times the solid angle that would have it all over, or times the area across
+    /// the rays, here of a disc, that meets the scene.
+    pub fn power(&self, disc_area: f64) -> f64 {
+        let intensity = self.intensity.as_dvec3().element_sum() / 3.0;
+        intensity
+            * match self.emission {
+                Emission::Point => 4.0 * PI,
+                // The falloff is the square of a ramp, whose integral is a third of its width.
+                Emission::Spot { inner, outer, .. } => 2.0 * PI * (inner + (outer - inner) / 3.0),
+                Emission::Directional { .. } => disc_area,
+            }
+    }
 }
 
 impl Scene {
     /// Objects that emit light, with the exitance of their sides together, mean of RGB, as if there were no textures.
-    fn emitting_objects(&self) -> impl Iterator<Item = (&Object, f64)> {
+    pub(crate) fn emitting_objects(&self) -> impl Iterator<Item = (&Object, f64)> {
         self.objects.iter().filter_map(|object| {
             let material = &self.materials[object.material as usize];
             let radiance = material.emission.as_dvec3().element_sum() / 3.0;
@@ -28,46 +70,7 @@ impl Scene {
     }
 
     /// Whether anything in it emits light.
-    pub(super) fn has_emissive_triangles(&self) -> bool {
+    pub(crate) fn has_emissive_triangles(&self) -> bool {
         self.emitting_objects().next().is_some()
-    }
-
-    /// How many triangles emit light.
-    pub fn emissive_triangle_count(&self) -> usize {
-        self.emitting_objects().map(|(object, _)| object.triangles.len()).sum()
-    }
-
-    /// The triangles that emit light, in the order of [`Scene::triangles`].
-    ///
-    /// Photons are emitted, and lights sampled, nearly in proportion to their powers.
-    pub fn emissive_triangles(&self) -> Vec<EmissiveTriangle> {
-        self.shining_triangles()
-            .0
-            .into_iter()
-            .map(|(emissive, _)| emissive)
-            .collect()
-    }
-
-    /// Each with the way it shines over its area, and whether some would have to be known more finely than they are.
-    pub(super) fn shining_triangles(&self) -> (Vec<(EmissiveTriangle, Shine)>, bool) {
-        let even: Vec<EmissiveTriangle> = self
-            .emitting_objects()
-            .flat_map(|(object, exitance)| {
-                object.triangles.clone().map(move |triangle| {
-                    let area = self.triangle_area(triangle);
-                    EmissiveTriangle {
-                        triangle,
-                        area,
-                        power: exitance * area,
-                    }
-                })
-            })
-            .collect();
-        let (shines, is_coarse) = Shine::of_all(self, &even);
-        let shining = |(even, shine): (EmissiveTriangle, Shine)| {
-            let power = even.power * shine.mean;
-            (EmissiveTriangle { power, ..even }, shine)
-        };
-        (even.into_iter().zip(shines).map(shining).collect(), is_coarse)
     }
 }

@@ -1,394 +1,147 @@
-//! Reduces glTF materials to what the renderer does, and says what is left out.
+//! Materials: how surfaces scatter and emit light.
 
 use glam::Vec3;
-use gltf::json;
-use gltf::json::extensions::material::Volume;
-use gltf::json::material::{AlphaMode, NormalTexture};
-use gltf::json::texture::Info;
-use gltf::json::validation::Checked;
 
-use super::coat::{self, Clearcoat};
-use super::diagnostic::{Check, Warnings, damaged, label, shorten};
-use super::texture::{TextureReader, TextureUse};
-use super::{Alpha, Coat, Dielectric, Gloss, Material, MaterialTextures, Surface};
-
-/// Index of refraction where the file gives none.
-const DEFAULT_IOR: f32 = 1.5;
-
-/// Largest index of refraction: far above any material's, and its square is far from the end of f32.
-const MAX_IOR: f32 = 100.0;
-
-/// Largest scale of a normal texture: what leans further lies in the surface.
-const STEEPEST: f32 = 1e4;
-
-/// Converts every material of the file, and the default material after them.
-///
-/// Only those that `used` marks (one flag for each, the default's last) give rise to warnings.
-pub(super) fn materials(
-    root: &json::Root,
-    used: &[bool],
-    textures: &mut TextureReader<'_>,
-    warnings: &mut Warnings,
-) -> Check<Vec<Material>> {
-    let default = json::Material {
-        name: Some("default".into()),
-        ..Default::default()
-    };
-    let mut materials = Vec::with_capacity(root.materials.len() + 1);
-    for (index, json) in root.materials.iter().chain([&default]).enumerate() {
-        let mut reader = Reader {
-            json,
-            solid: false,
-            warnings: Vec::new(),
-        };
-        let label = label("material", index, json.name.as_deref());
-        let mut material = reader.read(index).map_err(|what| format!("{label}: {what}"))?;
-        if used[index] {
-            material.textures = reader.textures(textures).map_err(|what| format!("{label}: {what}"))?;
-            if material.unlit {
-                // The one colour that it has.
-                material.textures.emission = material.textures.base_color;
-            }
-            for warning in reader.warnings {
-                warnings.push(format!("{label}: {warning}"));
-            }
-        }
-        materials.push(material);
-    }
-    Ok(materials)
+/// How a surface scatters light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Surface {
+    /// Lambertian reflection with the material's base colour as albedo.
+    Matte,
+    /// Perfect mirror: Schlick's Fresnel with the base colour as reflectance at normal incidence.
+    Mirror,
+    /// Boundary of a dielectric.
+    Dielectric(Dielectric),
+    /// A Lambertian base under a boundary of microfacets: glTF 2.0, appendix B.
+    Glossy(Gloss),
 }
 
-/// What the material at `index`, which was read as `thin`, is if it isn't taken for a thin wall.
-pub(super) fn solid(root: &json::Root, index: usize, thin: &Material) -> Check<Material> {
-    let mut reader = Reader {
-        json: &root.materials[index],
-        solid: true,
-        warnings: Vec::new(),
-    };
-    Ok(Material {
-        textures: thin.textures,
-        ..reader.read(index)?
-    })
+/// What passes light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dielectric {
+    /// Index of refraction inside, relative to vacuum.
+    pub ior: f32,
+    /// Its square is GGX's α; 0 ..= 1.
+    pub roughness: f32,
+    /// Share of what is no metal that passes light, 0 ..= 1.
+    pub transmission: f32,
+    /// How the rest reflects.
+    pub gloss: Gloss,
+    /// A wall without an inside, which doesn't bend light.
+    pub thin: bool,
+    /// Absorption coefficient inside, linear RGB, 1/render unit.
+    pub absorption: Vec3,
+    /// 20 over the Abbe number; 0: the index is that of every wavelength.
+    pub dispersion: f32,
 }
 
-/// One material with the warnings about it.
-struct Reader<'a> {
-    json: &'a json::Material,
-    /// Whether it is solid where it has no volume.
-    solid: bool,
-    warnings: Vec<String>,
-}
-
-impl Reader<'_> {
-    fn read(&mut self, index: usize) -> Check<Material> {
-        let [red, green, blue, alpha] = self.json.pbr_metallic_roughness.base_color_factor.0;
-        let [alpha] = self.fractions("alpha of its baseColorFactor", [alpha])?;
-        let base_color = self.fractions("baseColorFactor", [red, green, blue])?;
-        let unlit = self.extension(|extensions| extensions.unlit.as_ref()).is_some();
-        let coat = self.coat()?;
-        let (surface, emission) = (self.surface(coat.factor > 0.0)?, self.emission()?);
-        let (surface, coat, base_color, emission) = if unlit {
-            (Surface::Matte, Coat::default(), Vec3::ZERO, base_color.into())
-        } else {
-            (surface, coat, base_color.into(), emission)
-        };
-        Ok(Material {
-            name: match &self.json.name {
-                Some(name) => shorten(name),
-                None => format!("material {index}"),
-            },
-            surface,
-            coat,
-            base_color,
-            emission,
-            back_emits: self.json.double_sided || unlit,
-            // Glass has an inside to be seen from.
-            back_hidden: !self.json.double_sided && !matches!(surface, Surface::Dielectric(_)),
-            unlit,
-            alpha: match self.json.alpha_mode {
-                Checked::Valid(AlphaMode::Opaque) => Alpha::Opaque,
-                Checked::Valid(AlphaMode::Mask) => Alpha::Mask {
-                    alpha,
-                    cutoff: self.json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0),
-                },
-                Checked::Valid(AlphaMode::Blend) => Alpha::Blend { alpha },
-                Checked::Invalid => return Err(damaged("its alphaMode is none of OPAQUE, MASK and BLEND")),
-            },
-            textures: MaterialTextures::default(),
-        })
-    }
-
-    /// A metal is a metal even where it claims to transmit: glTF mixes the two lobes by metallicFactor first.
-    fn surface(&mut self, coated: bool) -> Check<Surface> {
-        let pbr = &self.json.pbr_metallic_roughness;
-        let [metallic] = self.fractions("metallicFactor", [pbr.metallic_factor.0])?;
-        let [roughness] = self.fractions("roughnessFactor", [pbr.roughness_factor.0])?;
-        let transmission = self.extension(|extensions| extensions.transmission.as_ref());
-        let transmission = transmission.map_or(0.0, |transmission| transmission.transmission_factor.0);
-        let [transmission] = self.fractions("transmissionFactor", [transmission])?;
-        let ior = self.ior()?;
-        let (specular, specular_color) = self.specular()?;
-        let attenuation_color = self.attenuation_color()?;
-
-        // A texture may make less of a factor, and other things from place to place.
-        let textured = pbr.metallic_roughness_texture.is_some();
-        let all_metal = metallic == 1.0 && !textured;
-        if all_metal && transmission > 0.0 {
-            self.warn("metallicFactor 1 leaves nothing of its transmission, and it is rendered as metal; set it to 0 for glass".into());
-        }
-        if all_metal && roughness == 0.0 {
-            return Ok(Surface::Mirror);
-        }
-        let is_clear = transmission > 0.0 && !all_metal;
-        if !is_clear && metallic == 0.0 && specular == 0.0 && !coated {
-            return Ok(Surface::Matte);
-        }
-        // KHR_materials_ior and KHR_materials_specular.
-        let of_ior = normal_reflectance(ior);
-        let gloss = Gloss {
-            metallic,
-            roughness,
-            specular_f0: (specular_color * of_ior).min(Vec3::ONE) * specular,
-            specular_f90: specular,
-        };
-        if !is_clear {
-            return Ok(Surface::Glossy(gloss));
-        }
-        // Where all is reflected, nothing is bent.
-        let ior = if ior == 0.0 { DEFAULT_IOR } else { ior };
-        let volume = self.extension(|extensions| extensions.volume.as_ref());
-        let thin = !self.solid && volume.is_none_or(|volume| volume.thickness_factor.0 == 0.0);
-        Ok(Surface::Dielectric(Dielectric {
+impl Dielectric {
+    /// Smooth and clear.
+    pub fn clear(ior: f32) -> Self {
+        Self {
             ior,
-            roughness,
-            transmission,
-            gloss,
-            thin,
-            absorption: volume
-                .filter(|_| !thin)
-                .map_or(Vec3::ZERO, |volume| absorption(attenuation_color, volume)),
-            // A thin wall doesn't bend light.
-            dispersion: if thin { 0.0 } else { self.dispersion()? },
-        }))
-    }
-
-    /// 0 stands for infinity.
-    fn ior(&self) -> Check<f32> {
-        let ior = self.extension(|extensions| extensions.ior.as_ref());
-        let ior = ior.map_or(DEFAULT_IOR, |ior| ior.ior.0);
-        if ior != 0.0 && !(1.0..=MAX_IOR).contains(&ior) {
-            return Err(format!(
-                "its index of refraction is {ior}, but it must be 0 or from 1 to {MAX_IOR}; correct it in the file"
-            ));
+            roughness: 0.0,
+            transmission: 1.0,
+            gloss: Gloss::default(),
+            thin: false,
+            absorption: Vec3::ZERO,
+            dispersion: 0.0,
         }
-        Ok(ior)
     }
+}
 
-    /// Of KHR_materials_dispersion, which the `gltf` crate doesn't know.
-    fn dispersion(&self) -> Check<f32> {
-        let extension = self.extension(|extensions| extensions.others.get("KHR_materials_dispersion"));
-        let dispersion = extension
-            .and_then(|extension| extension.get("dispersion"))
-            .map_or(Some(0.0), |it| it.as_f64());
-        let dispersion = dispersion.ok_or_else(|| damaged("its dispersion isn't a number"))?;
-        let [dispersion] = not_negative("dispersion", [dispersion as f32])?;
-        Ok(dispersion)
-    }
+/// How a boundary of microfacets reflects.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Gloss {
+    /// How far the surface is a metal, 0 ..= 1.
+    pub metallic: f32,
+    /// Its square is GGX's α; 0 ..= 1.
+    pub roughness: f32,
+    /// Reflectance at normal incidence where it is no metal, linear RGB.
+    pub specular_f0: Vec3,
+    /// Reflectance at grazing incidence where it is no metal.
+    pub specular_f90: f32,
+}
 
-    fn clearcoat(&self) -> Check<Clearcoat> {
-        let clearcoat = Clearcoat::of(self.json).transpose();
-        let clearcoat = clearcoat.map_err(|error| damaged(format_args!("its {}: {error}", coat::EXTENSION)))?;
-        Ok(clearcoat.unwrap_or_default())
-    }
+/// KHR_materials_clearcoat: a dielectric's reflection above all others.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Coat {
+    /// How much of it there is, 0 ..= 1; 0 for none.
+    pub factor: f32,
+    /// Its square is GGX's α; 0 ..= 1.
+    pub roughness: f32,
+}
 
-    fn coat(&mut self) -> Check<Coat> {
-        let clearcoat = self.clearcoat()?;
-        let [factor] = self.fractions("clearcoatFactor", [clearcoat.clearcoat_factor])?;
-        let [roughness] = self.fractions("clearcoatRoughnessFactor", [clearcoat.clearcoat_roughness_factor])?;
-        Ok(Coat { factor, roughness })
-    }
+/// Where a surface is there at all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Alpha {
+    /// Everywhere.
+    Opaque,
+    /// Where alpha, with texture and corners' colours, is at least the cutoff.
+    Mask {
+        /// Factor.
+        alpha: f32,
+        /// The least.
+        cutoff: f32,
+    },
+    /// With alpha as probability.
+    Blend {
+        /// Factor.
+        alpha: f32,
+    },
+}
 
-    fn emission(&mut self) -> Check<Vec3> {
-        let strength = self.extension(|extensions| extensions.emissive_strength.as_ref());
-        let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
-        let [strength] = not_negative("emissiveStrength", [strength])?;
-        // Factors above 1 occur in files that are older than the extension, and mean what they say.
-        let factor = not_negative("emissiveFactor", self.json.emissive_factor.0)?;
-        let emission = factor.map(|factor| factor * strength);
-        Ok(not_negative("emissiveFactor times emissiveStrength", emission)?.into())
-    }
+/// Indices into [`Textures::lookups`] of what a material's factors are multiplied with.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MaterialTextures {
+    /// Base colour, and alpha.
+    pub base_color: Option<u32>,
+    /// Roughness in green, metal in blue.
+    pub metallic_roughness: Option<u32>,
+    /// Normals, and how far they lean.
+    pub normal: Option<(u32, f32)>,
+    /// Emission.
+    pub emission: Option<u32>,
+    /// Transmission in red.
+    pub transmission: Option<u32>,
+    /// Reflectance at both angles in alpha.
+    pub specular: Option<u32>,
+    /// Reflectance at normal incidence.
+    pub specular_color: Option<u32>,
+    /// How much of a clear coat there is, in red.
+    pub coat: Option<u32>,
+    /// Its roughness, in green.
+    pub coat_roughness: Option<u32>,
+    /// Its normals, and how far they lean.
+    pub coat_normal: Option<(u32, f32)>,
+}
 
-    /// Factor and colour of KHR_materials_specular.
-    fn specular(&mut self) -> Check<(f32, Vec3)> {
-        let Some(specular) = self.extension(|extensions| extensions.specular.as_ref()) else {
-            return Ok((1.0, Vec3::ONE));
-        };
-        let (factor, color) = (specular.specular_factor.0, specular.specular_color_factor.0);
-        let [factor] = self.fractions("specularFactor", [factor])?;
-        Ok((factor, not_negative("specularColorFactor", color)?.into()))
-    }
-
-    /// Of KHR_materials_volume, whose other values are checked.
-    fn attenuation_color(&mut self) -> Check<Vec3> {
-        let Some(volume) = self.extension(|extensions| extensions.volume.as_ref()) else {
-            return Ok(Vec3::ONE);
-        };
-        let (color, distance) = (volume.attenuation_color.0, volume.attenuation_distance.0);
-        not_negative("thicknessFactor", [volume.thickness_factor.0])?;
-        let color = self.fractions("attenuationColor", color)?;
-        // Infinity is the default.
-        if distance.is_nan() || distance <= 0.0 {
-            return Err(format!(
-                "its attenuationDistance is {distance}, but it must be positive; correct it in the file"
-            ));
-        }
-        Ok(color.into())
-    }
-
-    /// The textures. Not the thickness's: it is for renderers that don't trace through the solid.
-    fn textures(&mut self, reader: &mut TextureReader<'_>) -> Check<MaterialTextures> {
-        let json = self.json;
-        let pbr = &json.pbr_metallic_roughness;
-        let transmission = self.extension(|extensions| extensions.transmission.as_ref());
-        let specular = self.extension(|extensions| extensions.specular.as_ref());
-        let linear = |info: &Info| used(info, false);
-        let color = |info: &Info| used(info, true);
-        let coat = self.clearcoat()?;
-        let normals = [
-            ("normalTexture", json.normal_texture.as_ref()),
-            ("clearcoatNormalTexture", coat.clearcoat_normal_texture.as_ref()),
-        ];
-        let mut uses_of_normals = [None, None];
-        for (normals, (name, texture)) in uses_of_normals.iter_mut().zip(normals) {
-            *normals = texture.map(|texture| used_normals(name, texture)).transpose()?;
-        }
-        let [normal, coat_normal] = uses_of_normals;
-        let uses = [
-            pbr.base_color_texture.as_ref().map(color),
-            pbr.metallic_roughness_texture.as_ref().map(linear),
-            normal,
-            json.emissive_texture.as_ref().map(color),
-            transmission.and_then(|it| it.transmission_texture.as_ref()).map(linear),
-            specular.and_then(|it| it.specular_texture.as_ref()).map(linear),
-            specular.and_then(|it| it.specular_color_texture.as_ref()).map(color),
-            coat.clearcoat_texture.as_ref().map(linear),
-            coat.clearcoat_roughness_texture.as_ref().map(linear),
-            coat_normal,
-        ];
-        let [scale, coat_scale] = normals.map(|(_, texture)| texture.map_or(1.0, |texture| texture.scale));
-        let mut found = [None; 10];
-        for (found, wanted) in found.iter_mut().zip(&uses) {
-            if let Some(wanted) = wanted {
-                *found = reader.lookup(wanted, &mut self.warnings)?;
-            }
-        }
-        let [
-            base_color,
-            metallic_roughness,
-            normal,
-            emission,
-            transmission,
-            specular,
-            specular_color,
-            coat,
-            coat_roughness,
-            coat_normal,
-        ] = found;
-        Ok(MaterialTextures {
-            base_color,
-            metallic_roughness,
-            normal: normal.map(|index| (index, scale)),
-            emission,
-            transmission,
-            specular,
-            specular_color,
-            coat,
-            coat_roughness,
-            coat_normal: coat_normal.map(|index| (index, coat_scale)),
-        })
-    }
-
-    fn extension<'s, T>(
-        &'s self,
-        select: impl FnOnce(&'s json::extensions::material::Material) -> Option<&'s T>,
-    ) -> Option<&'s T> {
-        self.json.extensions.as_ref().and_then(select)
-    }
-
-    /// Factors from 0 to 1. Larger ones are cut to 1 with a warning.
-    fn fractions<const N: usize>(&mut self, what: &str, values: [f32; N]) -> Check<[f32; N]> {
-        let values = not_negative(what, values)?;
-        if values.iter().any(|&value| value > 1.0) {
-            self.warn(format!(
-                "{what} {} is above 1, which would make light out of nothing, and cut to it; correct it in the file",
-                spell(&values)
-            ));
-        }
-        Ok(values.map(|value| value.min(1.0)))
-    }
-
-    fn warn(&mut self, warning: String) {
-        self.warnings.push(warning);
-    }
+/// A glTF material, reduced to what is supported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Name in the file, or `material N`.
+    pub name: String,
+    /// How it scatters.
+    pub surface: Surface,
+    /// What lies above that.
+    pub coat: Coat,
+    /// Linear RGB albedo (matte), reflectance (mirror) or tint of each crossing (dielectric); each in 0 ..= 1.
+    pub base_color: Vec3,
+    /// Emitted radiance, linear RGB; zero for what isn't a light.
+    pub emission: Vec3,
+    /// Whether the back side emits as well. (Every surface scatters on both sides.)
+    pub back_emits: bool,
+    /// Whether a camera looks through the back side, as glTF 2.0 has it of surfaces with one side. It reflects light and throws
+    /// shadows all the same, and mirrors and glass show it.
+    pub back_hidden: bool,
+    /// KHR_materials_unlit: it is seen as its emission, but lights nothing and reflects nothing.
+    pub unlit: bool,
+    /// Where it is there.
+    pub alpha: Alpha,
+    /// Its textures.
+    pub textures: MaterialTextures,
 }
 
 /// A dielectric's reflectance at normal incidence.
-pub(super) fn normal_reflectance(ior: f32) -> f32 {
+pub(crate) fn normal_reflectance(ior: f32) -> f32 {
     ((ior - 1.0) / (ior + 1.0)).powi(2)
-}
-
-/// A texture of normals whose scale is one.
-fn used_normals(name: &str, texture: &NormalTexture) -> Check<TextureUse> {
-    let scale = texture.scale;
-    if scale.is_nan() || scale.abs() > STEEPEST {
-        return Err(format!(
-            "its {name}'s scale is {scale}, but its size must be {STEEPEST} at the most; correct it in the file"
-        ));
-    }
-    let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
-    let transform = others.and_then(|others| others.get("KHR_texture_transform")).cloned();
-    let transform = transform.map(serde_json::from_value).transpose();
-    Ok(TextureUse {
-        texture: texture.index.value(),
-        set: texture.tex_coord,
-        transform: transform.map_err(|error| damaged(format_args!("its {name}: {error}")))?,
-        srgb: false,
-    })
-}
-
-fn used(info: &Info, srgb: bool) -> TextureUse {
-    TextureUse {
-        texture: info.index.value(),
-        set: info.tex_coord,
-        transform: info
-            .extensions
-            .as_ref()
-            .and_then(|extensions| extensions.texture_transform.clone()),
-        srgb,
-    }
-}
-
-/// Beer's absorption coefficient: light keeps attenuationColor over attenuationDistance. 1/scene unit.
-fn absorption(color: Vec3, volume: &Volume) -> Vec3 {
-    // A black channel keeps next to nothing, and no infinity gets into the kernels.
-    const DARKEST: f32 = 1e-10;
-    let color = color.max(Vec3::splat(DARKEST));
-    -color.map(f32::ln) / volume.attenuation_distance.0
-}
-
-/// Checks that no value is negative, infinite or not a number.
-fn not_negative<const N: usize>(what: &str, values: [f32; N]) -> Check<[f32; N]> {
-    if values.iter().all(|&value| value >= 0.0 && value.is_finite()) {
-        Ok(values)
-    } else {
-        Err(format!(
-            "its {what} is {}, but it must be finite and not negative; correct it in the file",
-            spell(&values)
-        ))
-    }
-}
-
-fn spell(values: &[f32]) -> String {
-    let values: Vec<String> = values.iter().map(f32::to_string).collect();
-    values.join(" ")
 }

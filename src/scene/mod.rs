@@ -3,84 +3,25 @@
 //! *Render space* is world space recentred and rescaled in f64, so that the scene's bounds are centred on the origin
 //! and their longest half axis is 1. Whatever the units and the place of the scene, f32 then has the same precision.
 
-mod accessor;
-mod animation;
-mod attributes;
-mod breaches;
-mod budget;
-mod buffer;
-mod builder;
-mod bvh;
 mod camera;
-mod coat;
-mod contact;
-mod curve;
-mod diagnostic;
-mod document;
-mod doubled_lights;
-mod draco;
-mod elements;
 mod environment;
-mod facet;
-mod features;
-mod geometry;
-mod glb;
-mod graph;
-mod image;
-mod immersion;
-mod instance;
-mod instancing;
-mod json;
-mod ktx2;
 mod light;
-mod light_bounds;
-mod light_sources;
-mod light_table;
-mod light_units;
-mod load;
 mod material;
-mod meshopt;
-mod morph;
-mod near_lights;
-mod nesting;
-pub mod object_grid;
-mod packed;
-mod part;
 mod placement;
-mod primitive;
-mod punctual;
-mod scenes;
-mod sharing;
-mod shine;
-mod skin;
-mod solid;
-mod sphere;
-mod tangents;
 mod texture;
-mod variants;
 
-pub use budget::MEMORY_LIMIT;
-pub use features::SceneFeatures;
-pub(crate) use immersion::IN_VACUUM;
-pub use immersion::Immersion;
-pub use light_sources::MOST_SOURCES;
-#[cfg(test)]
-pub(crate) use light_table::set_alias_table;
-pub use light_units::LightUnits;
-pub use load::LoadOptions;
-pub use packed::PackedScene;
-pub(crate) use part::Part;
+pub use camera::{Camera, Lens, Projection};
+pub(crate) use camera::{frame, framed_on};
+pub use environment::Environment;
+pub use light::{Emission, PunctualLight};
+pub(crate) use material::normal_reflectance;
+pub use material::{Alpha, Coat, Dielectric, Gloss, Material, MaterialTextures, Surface};
 pub use placement::Placement;
-pub(crate) use sphere::Sphere;
 pub use texture::Textures;
 
 use std::path::PathBuf;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
-
-pub use environment::Environment;
-pub use light::EmissiveTriangle;
-pub use punctual::{Emission, PunctualLight};
 
 /// The map from world space to render space: `render = (world − centre) · scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,145 +39,6 @@ impl Normalisation {
     }
 }
 
-/// How a surface scatters light.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Surface {
-    /// Lambertian reflection with the material's base colour as albedo.
-    Matte,
-    /// Perfect mirror: Schlick's Fresnel with the base colour as reflectance at normal incidence.
-    Mirror,
-    /// Boundary of a dielectric.
-    Dielectric(Dielectric),
-    /// A Lambertian base under a boundary of microfacets: glTF 2.0, appendix B.
-    Glossy(Gloss),
-}
-
-/// What passes light.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dielectric {
-    /// Index of refraction inside, relative to vacuum.
-    pub ior: f32,
-    /// Its square is GGX's α; 0 ..= 1.
-    pub roughness: f32,
-    /// Share of what is no metal that passes light, 0 ..= 1.
-    pub transmission: f32,
-    /// How the rest reflects.
-    pub gloss: Gloss,
-    /// A wall without an inside, which doesn't bend light.
-    pub thin: bool,
-    /// Absorption coefficient inside, linear RGB, 1/render unit.
-    pub absorption: Vec3,
-    /// 20 over the Abbe number; 0: the index is that of every wavelength.
-    pub dispersion: f32,
-}
-
-impl Dielectric {
-    /// Smooth and clear.
-    pub fn clear(ior: f32) -> Self {
-        Self {
-            ior,
-            roughness: 0.0,
-            transmission: 1.0,
-            gloss: Gloss::default(),
-            thin: false,
-            absorption: Vec3::ZERO,
-            dispersion: 0.0,
-        }
-    }
-}
-
-/// How a boundary of microfacets reflects.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Gloss {
-    /// How far the surface is a metal, 0 ..= 1.
-    pub metallic: f32,
-    /// Its square is GGX's α; 0 ..= 1.
-    pub roughness: f32,
-    /// Reflectance at normal incidence where it is no metal, linear RGB.
-    pub specular_f0: Vec3,
-    /// Reflectance at grazing incidence where it is no metal.
-    pub specular_f90: f32,
-}
-
-/// KHR_materials_clearcoat: a dielectric's reflection above all others.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Coat {
-    /// How much of it there is, 0 ..= 1; 0 for none.
-    pub factor: f32,
-    /// Its square is GGX's α; 0 ..= 1.
-    pub roughness: f32,
-}
-
-/// Where a surface is there at all.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Alpha {
-    /// Everywhere.
-    Opaque,
-    /// Where alpha, with texture and corners' colours, is at least the cutoff.
-    Mask {
-        /// Factor.
-        alpha: f32,
-        /// The least.
-        cutoff: f32,
-    },
-    /// With alpha as probability.
-    Blend {
-        /// Factor.
-        alpha: f32,
-    },
-}
-
-/// Indices into [`Textures::lookups`] of what a material's factors are multiplied with.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct MaterialTextures {
-    /// Base colour, and alpha.
-    pub base_color: Option<u32>,
-    /// Roughness in green, metal in blue.
-    pub metallic_roughness: Option<u32>,
-    /// Normals, and how far they lean.
-    pub normal: Option<(u32, f32)>,
-    /// Emission.
-    pub emission: Option<u32>,
-    /// Transmission in red.
-    pub transmission: Option<u32>,
-    /// Reflectance at both angles in alpha.
-    pub specular: Option<u32>,
-    /// Reflectance at normal incidence.
-    pub specular_color: Option<u32>,
-    /// How much of a clear coat there is, in red.
-    pub coat: Option<u32>,
-    /// Its roughness, in green.
-    pub coat_roughness: Option<u32>,
-    /// Its normals, and how far they lean.
-    pub coat_normal: Option<(u32, f32)>,
-}
-
-/// A glTF material, reduced to what is supported.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Material {
-    /// Name in the file, or `material N`.
-    pub name: String,
-    /// How it scatters.
-    pub surface: Surface,
-    /// What lies above that.
-    pub coat: Coat,
-    /// Linear RGB albedo (matte), reflectance (mirror) or tint of each crossing (dielectric); each in 0 ..= 1.
-    pub base_color: Vec3,
-    /// Emitted radiance, linear RGB; zero for what isn't a light.
-    pub emission: Vec3,
-    /// Whether the back side emits as well. (Every surface scatters on both sides.)
-    pub back_emits: bool,
-    /// Whether a camera looks through the back side, as glTF 2.0 has it of surfaces with one side. It reflects light and throws
-    /// shadows all the same, and mirrors and glass show it.
-    pub back_hidden: bool,
-    /// KHR_materials_unlit: it is seen as its emission, but lights nothing and reflects nothing.
-    pub unlit: bool,
-    /// Where it is there.
-    pub alpha: Alpha,
-    /// Its textures.
-    pub textures: MaterialTextures,
-}
-
 /// One primitive of one mesh instance: the unit within which photons and visible points meet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
@@ -252,7 +54,7 @@ pub struct Object {
 
 impl Object {
     /// Where a corner of one of its triangles is, in render space.
-    fn placed(&self, corner: Vec3) -> Vec3 {
+    pub(crate) fn placed(&self, corner: Vec3) -> Vec3 {
         self.placement.map_or(corner, |placement| placement.point(corner))
     }
 }
@@ -268,53 +70,6 @@ pub struct Triangle {
 
 /// [`Triangle::object`] of triangles that objects share.
 pub const SHARED: u32 = u32::MAX;
-
-/// What a camera's picture shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Projection {
-    /// What lies within an angle.
-    Perspective {
-        /// Tangent of half the vertical angle of view.
-        tan_half_fov: f32,
-    },
-    /// What lies within a height.
-    Orthographic {
-        /// Half of it, in render units.
-        half_height: f32,
-    },
-}
-
-/// What makes things out of focus blurred.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lens {
-    /// Its radius, in render units.
-    pub radius: f32,
-    /// Distance along the direction of view of what is in focus, in render units.
-    pub focus: f32,
-}
-
-/// A camera in render space.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Camera {
-    /// Name in the file, or `camera N`.
-    pub name: String,
-    /// Centre of projection.
-    pub position: Vec3,
-    /// Unit vector to the picture's right.
-    pub right: Vec3,
-    /// Unit vector to the picture's top.
-    pub up: Vec3,
-    /// Unit vector into the picture.
-    pub forward: Vec3,
-    /// What it shows.
-    pub projection: Projection,
-    /// Width over height where the file gives it.
-    pub aspect: Option<f32>,
-    /// Its lens; a pinhole has none.
-    pub lens: Option<Lens>,
-    /// How far the film is moved to the right and up, in parts of its larger side.
-    pub shift: Vec2,
-}
 
 /// A scene, ready to render.
 #[derive(Debug, Clone)]

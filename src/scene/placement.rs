@@ -19,7 +19,7 @@ pub struct Placement {
 
 impl Placement {
     /// The map, rounded; `None` for one that flattens or stretches too much to be undone.
-    pub(super) fn new(map: DAffine3) -> Option<Self> {
+    pub(crate) fn new(map: DAffine3) -> Option<Self> {
         let columns = [map.x_axis, map.y_axis, map.z_axis, map.w_axis].map(DVec3::as_vec3);
         let rows = [0, 1, 2].map(|row| columns.map(|column| column[row]));
         let placement = Self { rows };
@@ -47,7 +47,7 @@ impl Placement {
     }
 
     /// The way back, and how far from their place, in the triangles' space, rounding may put corners.
-    pub(super) fn inverse(&self) -> ([[f32; 4]; 3], f32) {
+    pub(crate) fn inverse(&self) -> ([[f32; 4]; 3], f32) {
         let inverse = self.map().inverse();
         let columns = [inverse.x_axis, inverse.y_axis, inverse.z_axis, inverse.w_axis].map(DVec3::as_vec3);
         let rows = [0, 1, 2].map(|row| columns.map(|column| column[row]));

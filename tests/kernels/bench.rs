@@ -11,8 +11,12 @@ use ppm_vk::emission::Aim;
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
 use ppm_vk::layout::{CAUSTIC, NEAREST, NO_OBJECT, Photon, Settings, TextureLookup, VisiblePoint};
+use ppm_vk::packing::PackedScene;
 use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::{Emission, Environment, PackedScene, PunctualLight, Scene};
+use ppm_vk::scene::Emission;
+use ppm_vk::scene::Environment;
+use ppm_vk::scene::PunctualLight;
+use ppm_vk::scene::Scene;
 use ppm_vk::stage::BufferId;
 
 /// What the names of scenes end in that have a light of every kind more than their file.

@@ -6,8 +6,8 @@ use ppm_vk::config::{Probe, RenderConfig};
 use ppm_vk::cpu::{self, Counts, GatheredWith, Seen};
 use ppm_vk::gather::{self, METHODS};
 use ppm_vk::layout::{Coverage, Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
+use ppm_vk::packing::PackedScene;
 use ppm_vk::record::Recording;
-use ppm_vk::scene::PackedScene;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 

@@ -10,8 +10,10 @@ use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
 use ppm_vk::layout::{DIELECTRIC, MIRRORED, Settings, ShadingTriangle, TOUCHED};
 use ppm_vk::metrics::compare;
+use ppm_vk::packing::PackedScene;
 use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::{PackedScene, Placement, Scene};
+use ppm_vk::scene::Placement;
+use ppm_vk::scene::Scene;
 use serde_json::{Value, json};
 
 use super::agreement::Agreement;

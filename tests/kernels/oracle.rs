@@ -8,7 +8,7 @@ use ppm_vk::cpu::{self, Batch, Counts, Inputs, Ray, Renderer};
 use ppm_vk::film::Image;
 use ppm_vk::layout::{Gathered, Settings};
 use ppm_vk::metrics;
-use ppm_vk::scene::PackedScene;
+use ppm_vk::packing::PackedScene;
 
 use super::bench::{packed, random_numbers, scene, small};
 

@@ -3,9 +3,15 @@
 use glam::Vec3;
 use ppm_vk::config::{Accel, RenderConfig, TriangleTest};
 use ppm_vk::gpu::Device;
+use ppm_vk::packing::PackedScene;
+use ppm_vk::packing::SceneFeatures;
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::record::Recording;
-use ppm_vk::scene::{Object, PackedScene, Placement, SHARED, Scene, SceneFeatures, Triangle};
+use ppm_vk::scene::Object;
+use ppm_vk::scene::Placement;
+use ppm_vk::scene::SHARED;
+use ppm_vk::scene::Scene;
+use ppm_vk::scene::Triangle;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 

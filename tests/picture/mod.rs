@@ -7,8 +7,9 @@ use ppm_vk::config::RenderConfig;
 use ppm_vk::film::{Image, read_exr};
 use ppm_vk::gpu::Device;
 use ppm_vk::metrics::{Defects, defects};
+use ppm_vk::packing::PackedScene;
 use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::scene::Scene;
 
 pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

@@ -7,7 +7,8 @@ use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
-use ppm_vk::scene::{Environment, Projection};
+use ppm_vk::scene::Environment;
+use ppm_vk::scene::Projection;
 
 use crate::document::{Document, light, matte, mirror, one_sided};
 use crate::measure::{Region, measure};

@@ -6,7 +6,9 @@ use ppm_vk::config::{EmissionChoice, Estimator, RenderConfig};
 use ppm_vk::estimate::{ErrorEstimate, RelativeError, of_one_photon};
 use ppm_vk::film::Image;
 use ppm_vk::metrics::{compare, relative_errors};
-use ppm_vk::scene::{Emission, Environment, PunctualLight};
+use ppm_vk::scene::Emission;
+use ppm_vk::scene::Environment;
+use ppm_vk::scene::PunctualLight;
 
 use crate::document::{Document, clear, matte};
 use crate::mesh::Mesh;

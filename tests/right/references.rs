@@ -3,7 +3,9 @@
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Direct, Estimator, RenderConfig};
 use ppm_vk::film::Image;
-use ppm_vk::scene::{Environment, LoadOptions, Scene};
+use ppm_vk::loader::LoadOptions;
+use ppm_vk::scene::Environment;
+use ppm_vk::scene::Scene;
 
 use crate::measure::{Measured, measure};
 use crate::picture::{Subject, folder, reference, small};

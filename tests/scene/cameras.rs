@@ -3,7 +3,8 @@
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use glam::Vec3;
-use ppm_vk::scene::{Camera, Projection};
+use ppm_vk::scene::Camera;
+use ppm_vk::scene::Projection;
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_close};

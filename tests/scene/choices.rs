@@ -1,7 +1,8 @@
 //! What a file leaves to choose: material variants and scenes.
 
 use ppm_vk::error::Result;
-use ppm_vk::scene::{LoadOptions, Scene};
+use ppm_vk::loader::LoadOptions;
+use ppm_vk::scene::Scene;
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_error};

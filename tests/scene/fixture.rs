@@ -7,7 +7,9 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 use ppm_vk::error::{Error, Result};
-use ppm_vk::scene::{Environment, LoadOptions, Scene};
+use ppm_vk::loader::LoadOptions;
+use ppm_vk::scene::Environment;
+use ppm_vk::scene::Scene;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 

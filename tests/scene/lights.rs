@@ -5,7 +5,12 @@ use std::f64::consts::PI;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
-use ppm_vk::scene::{Emission, EmissiveTriangle, Environment, LightUnits, LoadOptions, PackedScene};
+use ppm_vk::loader::LightUnits;
+use ppm_vk::loader::LoadOptions;
+use ppm_vk::packing::EmissiveTriangle;
+use ppm_vk::packing::PackedScene;
+use ppm_vk::scene::Emission;
+use ppm_vk::scene::Environment;
 use serde_json::{Value, json};
 
 use crate::fixture::Fixture;

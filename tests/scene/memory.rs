@@ -1,7 +1,8 @@
 //! What a scene may take of memory in all.
 
 use ppm_vk::film::Image;
-use ppm_vk::scene::{Environment, LoadOptions};
+use ppm_vk::loader::LoadOptions;
+use ppm_vk::scene::Environment;
 use serde_json::json;
 
 use crate::fixture::Fixture;

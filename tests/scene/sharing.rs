@@ -1,7 +1,8 @@
 //! Which primitives nodes share.
 
 use glam::Vec3;
-use ppm_vk::scene::{SHARED, Scene};
+use ppm_vk::scene::SHARED;
+use ppm_vk::scene::Scene;
 use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close};

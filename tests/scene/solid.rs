@@ -1,6 +1,9 @@
 //! Glass without a volume: thin by the specification, solid by `LoadOptions::solid_glass` where its mesh is closed.
 
-use ppm_vk::scene::{Dielectric, LoadOptions, Scene, Surface};
+use ppm_vk::loader::LoadOptions;
+use ppm_vk::scene::Dielectric;
+use ppm_vk::scene::Scene;
+use ppm_vk::scene::Surface;
 use serde_json::json;
 
 use crate::fixture::Fixture;

@@ -5,7 +5,8 @@ use ppm_vk::backend::Backend;
 use ppm_vk::config::{Accel, Direct, RenderConfig, TriangleTest};
 use ppm_vk::cpu;
 use ppm_vk::film::Image;
-use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::packing::PackedScene;
+use ppm_vk::scene::Scene;
 use serde_json::json;
 
 use super::model::{Model, parallelogram};

@@ -7,7 +7,8 @@ use ppm_vk::backend::Backend;
 use ppm_vk::config::{Direct, EmissionChoice, Estimator, RenderConfig};
 use ppm_vk::cpu;
 use ppm_vk::layout::{NO_OBJECT, Settings, VisiblePoint};
-use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::packing::PackedScene;
+use ppm_vk::scene::Scene;
 use ppm_vk::stage::BufferId;
 use serde_json::json;
 

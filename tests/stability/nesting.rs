@@ -3,7 +3,8 @@
 use glam::Vec3;
 use ppm_vk::backend::Backend;
 use ppm_vk::cpu;
-use ppm_vk::scene::{PackedScene, Scene};
+use ppm_vk::packing::PackedScene;
+use ppm_vk::scene::Scene;
 use serde_json::json;
 
 use super::model::Model;

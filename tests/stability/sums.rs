@@ -6,9 +6,9 @@ use ppm_vk::cpu;
 use ppm_vk::film::Image;
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{Coverage, DirectSum, Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::packing::SceneFeatures;
 use ppm_vk::pipeline::Stages;
 use ppm_vk::record::Recording;
-use ppm_vk::scene::SceneFeatures;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 

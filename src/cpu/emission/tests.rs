@@ -8,8 +8,11 @@ use crate::config::{RenderConfig, Sampler};
 use crate::emission::{Aim, PathValue};
 use crate::film::Image;
 use crate::layout::{Settings, VisiblePoint};
+use crate::packing::PackedScene;
 use crate::random::PathKind;
-use crate::scene::{self, PackedScene, PunctualLight, Scene};
+use crate::scene;
+use crate::scene::PunctualLight;
+use crate::scene::Scene;
 
 /// The part of a spot's photons within an angle is the part of its intensity's integral there.
 #[test]

@@ -6,7 +6,8 @@ use super::*;
 use crate::backend::Backend as _;
 use crate::config::{EmissionChoice, RenderConfig};
 use crate::gpu::Device;
-use crate::scene::{PackedScene, Scene};
+use crate::packing::PackedScene;
+use crate::scene::Scene;
 
 fn renderer(name: &str, emission: EmissionChoice) -> Renderer {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -1,0 +1,32 @@
+//! Names of glTF extensions, those that `gltf` has no feature for.
+
+pub(crate) const BASISU: &str = "KHR_texture_basisu";
+pub(crate) const CLEARCOAT: &str = "KHR_materials_clearcoat";
+pub(crate) const DRACO: &str = "KHR_draco_mesh_compression";
+pub(crate) const MESHOPT: &str = "EXT_meshopt_compression";
+pub(crate) const MESH_INSTANCING: &str = "EXT_mesh_gpu_instancing";
+pub(crate) const QUANTIZATION: &str = "KHR_mesh_quantization";
+pub(crate) const VARIANTS: &str = "KHR_materials_variants";
+pub(crate) const WEBP: &str = "EXT_texture_webp";
+
+/// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
+/// `Cargo.toml` turns on.
+pub(crate) const SUPPORTED: &[&str] = &[
+    "KHR_lights_punctual",
+    CLEARCOAT,
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_texture_transform",
+    QUANTIZATION,
+    DRACO,
+    MESH_INSTANCING,
+    BASISU,
+    MESHOPT,
+    WEBP,
+    VARIANTS,
+];

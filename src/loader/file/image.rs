@@ -1,0 +1,118 @@
+//! Reads the images of a glTF file.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use gltf::json;
+use image::{ImageFormat, ImageReader, Limits};
+
+use super::budget::Budget;
+use super::buffer::read_uri;
+use super::document::Document;
+use super::ktx2;
+use super::ktx2::Ktx2;
+use crate::loader::diagnostic::{Check, damaged};
+
+/// Longest side of an image, in texels: sides are stored as 16 bits.
+const LONGEST_SIDE: u32 = 32_768;
+/// What a file may hold beside its pixels: profiles, comments, previews.
+const BESIDE_PIXELS: u64 = 64 << 20;
+/// What decoding may take beside the result, in bytes for each texel: 16-bit channels, and rows of filters.
+const MEMORY_A_TEXEL: u64 = 16;
+/// What decoding takes in fact: the pixels as the file has them, and a copy.
+const DECODING_A_TEXEL: u64 = 8;
+
+/// Bytes at the most of a file that begins like this and holds one picture.
+fn most_bytes(head: &[u8]) -> u64 {
+    let reader = ImageReader::new(Cursor::new(head)).with_guessed_format();
+    let size = reader.ok().and_then(|reader| reader.into_dimensions().ok());
+    let pixels = size.map_or(u64::MAX, |(width, height)| u64::from(width) * u64::from(height));
+    pixels.saturating_mul(MEMORY_A_TEXEL).saturating_add(BESIDE_PIXELS)
+}
+
+/// Pixels of an image, RGBA, as the file has them, in rows from the top left. What has more than 8 bits is rounded to them.
+pub(crate) struct Pixels {
+    pub width: u32,
+    pub height: u32,
+    pub rgba: Vec<[u8; 4]>,
+}
+
+impl Pixels {
+    /// Reads an image of `document`, whose file is in `folder`.
+    pub(crate) fn read(document: &Document, image: &json::Image, folder: &Path) -> Check<Self> {
+        let budget = &document.budget;
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => Self::decode(&read_uri(uri, folder, most_bytes, budget)?, budget),
+            (None, Some(view)) => {
+                let views = &document.root.buffer_views;
+                let json = views.get(view.value()).ok_or_else(|| {
+                    damaged(format_args!(
+                        "there is no bufferView {view}, the file has {}",
+                        views.len()
+                    ))
+                })?;
+                Self::decode(document.view_bytes(view.value(), json)?, budget)
+            }
+            (None, None) => Err(damaged("it has neither a uri nor a bufferView")),
+        }
+    }
+
+    fn decode(bytes: &[u8], budget: &Budget) -> Check<Self> {
+        if ktx2::is_ktx2(bytes) {
+            let picture = Ktx2::open(bytes)?;
+            take(picture.size, budget)?;
+            let [width, height] = picture.size;
+            return Ok(Self {
+                width,
+                height,
+                rgba: texels(&picture.decode()?),
+            });
+        }
+        let unreadable = |error| format!("it can't be decoded ({error}); export it as PNG, JPEG, WebP or KTX 2.0");
+        let format = match image::guess_format(bytes) {
+            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) => format,
+            Ok(other) => {
+                return Err(format!(
+                    "it is {other:?}, but only PNG, JPEG, WebP and KTX 2.0 are read; convert it"
+                ));
+            }
+            Err(_) => return Err("it is none of PNG, JPEG, WebP and KTX 2.0; convert it".into()),
+        };
+        let reader = || ImageReader::with_format(Cursor::new(bytes), format);
+        let (width, height) = reader().into_dimensions().map_err(unreadable)?;
+        let texels_of_all = take([width, height], budget)?;
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(MEMORY_A_TEXEL * texels_of_all + (1 << 20));
+        let mut reader = reader();
+        reader.limits(limits);
+        let decoded = reader.decode().map_err(unreadable)?.into_rgba8();
+        Ok(Self {
+            width,
+            height,
+            rgba: texels(&decoded),
+        })
+    }
+}
+
+/// Number of texels of an image, whose memory is taken. A few bytes can claim to be any number of texels: this asks before there
+/// is memory for them.
+fn take([width, height]: [u32; 2], budget: &Budget) -> Check<u64> {
+    let texels = u64::from(width) * u64::from(height);
+    if texels == 0 {
+        return Err(damaged("it has no texels"));
+    }
+    if width.max(height) > LONGEST_SIDE {
+        return Err(format!(
+            "it has {width}x{height} texels, more than the {LONGEST_SIDE} along a side that are read; make it smaller"
+        ));
+    }
+    let kept = size_of::<u32>() as u64 * texels;
+    let what = format!("an image of {width}x{height} texels");
+    budget.check(kept + DECODING_A_TEXEL * texels, &what)?;
+    budget.take(kept, &what)?;
+    Ok(texels)
+}
+
+fn texels(rgba: &[u8]) -> Vec<[u8; 4]> {
+    rgba.as_chunks::<4>().0.to_vec()
+}

@@ -1,0 +1,84 @@
+//! What the numbers of punctual lights mean, which exporters don't agree on.
+
+use gltf::json::Root;
+
+use crate::text::quote;
+
+/// Lumens a watt by which Blender's exporter multiplies lamps in its «Standard» units, and not what emits.
+const LUMENS_PER_WATT: f64 = 683.0;
+
+/// What the generator of Blender's exporter begins with.
+const BLENDER: &str = "Khronos glTF Blender I/O";
+
+/// Its first version with such units; older ones write what is «Unitless» now.
+const FIRST_IN_LUMENS: (u32, u32) = (3, 6);
+
+/// Units of the intensities of punctual lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum LightUnits {
+    /// `blender` where the file says that Blender's exporter wrote it, which is said, else `spec`.
+    #[default]
+    Auto,
+    /// Intensity and irradiance on the scale of emitted radiance, as `KHR_lights_punctual` has it.
+    Spec,
+    /// 683 times as much, as Blender's exporter has it in «Standard» units.
+    Blender,
+}
+
+impl LightUnits {
+    /// What intensities of a file are to be divided by.
+    pub(crate) fn divisor(self, root: &Root) -> f64 {
+        match self {
+            Self::Auto if is_in_lumens(generator(root)) => LUMENS_PER_WATT,
+            Self::Auto | Self::Spec => 1.0,
+            Self::Blender => LUMENS_PER_WATT,
+        }
+    }
+
+    /// What is to be said of a file with punctual lights.
+    pub(crate) fn note(self, root: &Root) -> Option<String> {
+        let taken = self == Self::Auto && is_in_lumens(generator(root));
+        taken.then(|| {
+            format!(
+                "{} wrote it: its lights are divided by {LUMENS_PER_WATT}, as Blender's «Standard» lighting wants it; where it was \
+                 exported as «Unitless», --light-units spec is right",
+                quote(generator(root))
+            )
+        })
+    }
+}
+
+fn generator(root: &Root) -> &str {
+    root.asset.generator.as_deref().unwrap_or_default()
+}
+
+fn is_in_lumens(generator: &str) -> bool {
+    let Some(version) = generator.strip_prefix(BLENDER) else {
+        return false;
+    };
+    let mut numbers = version.trim_start().trim_start_matches('v').split('.').map(str::parse);
+    match (numbers.next(), numbers.next()) {
+        (Some(Ok(major)), Some(Ok(minor))) => (major, minor) >= FIRST_IN_LUMENS,
+        _ => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blenders_exporter_writes_lumens_since_version_3_6() {
+        for (generator, expected) in [
+            ("Khronos glTF Blender I/O v5.3.43", true),
+            ("Khronos glTF Blender I/O v3.6.27", true),
+            ("Khronos glTF Blender I/O v3.5.30", false),
+            ("Khronos glTF Blender I/O v1.8.19", false),
+            ("Khronos glTF Blender I/O", true),
+            ("Blender", false),
+            ("", false),
+        ] {
+            assert_eq!(is_in_lumens(generator), expected, "{generator}");
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! Meshes: from primitives to the triangles that nodes show.
+
+pub(crate) mod assembly;
+pub(crate) mod attributes;
+mod builder;
+pub(crate) mod facet;
+pub(crate) mod geometry;
+pub(crate) mod instance;
+pub(crate) mod instancing;
+pub(crate) mod morph;
+mod normalisation;
+pub(crate) mod primitive;
+mod sharing;
+pub(crate) mod skin;
+pub(crate) mod solid;
+mod tangents;

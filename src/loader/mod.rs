@@ -1,0 +1,203 @@
+//! From a glTF file to a [`Scene`].
+
+mod animation;
+mod camera;
+mod clearcoat;
+mod curve;
+mod diagnostic;
+mod extensions;
+mod file;
+mod graph;
+mod light;
+mod light_units;
+mod limits;
+mod material;
+mod mesh;
+mod scenes;
+mod texture;
+mod variants;
+
+pub use self::file::budget::MEMORY_LIMIT;
+pub use self::light_units::LightUnits;
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use self::animation::Pose;
+use self::diagnostic::{Check, Warnings};
+use self::file::budget::Budget;
+use self::file::buffer::referred_files;
+use self::file::document::Document;
+use self::graph::place_nodes;
+use self::light::punctual_lights;
+use self::mesh::{assembly, solid};
+use self::texture::TextureReader;
+use crate::error::{Error, Result};
+use crate::scene::{Environment, Scene, Surface, framed_on};
+use crate::text::{quote, shorten};
+
+/// What a scene is loaded with.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LoadOptions {
+    /// The time that the file's animations are applied at, in seconds. `None`: nodes and morph targets are as the file
+    /// has them at rest.
+    pub frame_time: Option<f64>,
+    /// What surrounds the scene. `None`: nothing, or white light where the scene has no light at all, which is said.
+    pub environment: Option<Environment>,
+    /// Bytes that the scene may take as it is read, in all: buffers, what was compressed in them, geometry, images, environment.
+    /// `None`: [`MEMORY_LIMIT`].
+    pub memory_limit: Option<u64>,
+    /// The material variant (KHR_materials_variants) with that name. `None`: primitives have their own materials.
+    pub variant: Option<String>,
+    /// The scene of the file, by name or index. `None`: its default one.
+    pub scene: Option<String>,
+    /// What the intensities of punctual lights mean.
+    pub light_units: LightUnits,
+    /// Whether glass without a volume is solid where its mesh is closed, instead of a thin wall.
+    pub solid_glass: bool,
+    /// The angle that directional lights take up, in degrees, 0 ..= 180; 0: their rays are parallel.
+    pub sun_angle: f64,
+    /// Radius of points and spots, in scene units; 0: they have no extent.
+    pub light_radius: f64,
+}
+
+impl Scene {
+    /// Reads a glTF 2.0 file, `.gltf` or `.glb`, with the buffers that it refers to.
+    ///
+    /// What the file asks for and the renderer doesn't do yet is named in [`Scene::warnings`].
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`], one line, if the file or one of its buffers can't be read or is damaged, if it requires an
+    /// extension that isn't supported, or if it shows no triangle.
+    pub fn load(path: &Path) -> Result<Self> {
+        Self::load_with(path, LoadOptions::default())
+    }
+
+    /// The same with options.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::load`].
+    pub fn load_with(path: &Path, options: LoadOptions) -> Result<Self> {
+        load(path, options).map_err(|what| Error::scene(path, what))
+    }
+}
+
+fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
+    let mut warnings = Warnings::default();
+    let mut notes = Vec::new();
+    let budget = Budget::new(options.memory_limit.unwrap_or(MEMORY_LIMIT));
+    if let Some(environment) = &options.environment {
+        budget.take(environment.bytes(), "the environment")?;
+    }
+    let mut document = Document::read(path, budget, &mut warnings)?;
+    let variants = variants::names(&document.root)?;
+    if let Some(wanted) = &options.variant {
+        variants::choose(&mut document.root, &variants, wanted)?;
+    }
+    let document = document;
+    let root = &document.root;
+    let pose = match options.frame_time {
+        Some(time) => Pose::at(&document, time, &mut warnings)?,
+        None => Pose::default(),
+    };
+    let nodes = place_nodes(root, &pose, options.scene.as_deref(), &mut notes)?;
+    warn_of_ignored(&document, &options, &mut warnings);
+
+    let instances = assembly::instances(&document, &nodes, &pose, &mut warnings)?;
+    let mut geometry = assembly::assemble(&document, &instances, &mut warnings)?;
+
+    let mut used = vec![false; root.materials.len() + 1];
+    for object in &geometry.objects {
+        used[object.material as usize] = true;
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut textures = TextureReader::new(&document, folder);
+    let mut materials = material::materials(root, &used, &mut textures, &mut warnings)?;
+    document.budget.settle()?;
+    if used.last() == Some(&false) {
+        materials.pop();
+    }
+    let thin = solid::thin_glass(&materials, &used);
+    if options.solid_glass {
+        notes.extend(solid::make_solid(root, &mut geometry, &mut materials, &thin)?);
+    } else {
+        notes.extend(solid::note(root, &thin));
+    }
+    for material in &mut materials {
+        if let Surface::Dielectric(glass) = &mut material.surface {
+            glass.absorption /= geometry.normalisation.scale as f32;
+        }
+    }
+
+    let cameras = camera::cameras(root, &nodes, geometry.normalisation, &mut warnings)?;
+    let lights = punctual_lights(root, &nodes, geometry.normalisation, &options, &mut warnings)?;
+    if !lights.is_empty() {
+        notes.extend(options.light_units.note(root));
+    }
+    let mut scene = Scene {
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        positions: geometry.positions,
+        normals: geometry.normals,
+        texcoords: geometry.texcoords,
+        colors: geometry.colors,
+        tangents: geometry.tangents,
+        triangles: geometry.triangles,
+        objects: geometry.objects,
+        materials,
+        lights,
+        environment: options.environment,
+        textures: textures.finish(),
+        cameras,
+        normalisation: geometry.normalisation,
+        dropped_triangles: geometry.dropped_triangles,
+        files: std::iter::once(path.to_owned())
+            .chain(referred_files(root, folder))
+            .collect(),
+        variants: variants.iter().map(|name| shorten(name)).collect(),
+        notes,
+        warnings: Vec::new(),
+    };
+    if scene.cameras.is_empty() {
+        let elsewhere = root.nodes.iter().any(|node| node.camera.is_some());
+        let of_scene = if elsewhere {
+            "the scene that is rendered has no camera, though the file has"
+        } else {
+            "it has no camera"
+        };
+        warnings.push(format!("{of_scene}; one that is framed on its bounds is used"));
+        scene.cameras.push(framed_on(scene.bounds()));
+    }
+    if scene.environment.is_none() && scene.lights.is_empty() && !scene.has_emissive_triangles() {
+        warnings.push(
+            "it has no light; it is rendered in an environment of radiance 1 (--environment sets another one)".into(),
+        );
+        scene.environment = Some(Environment::constant(Vec3::ONE));
+    }
+    for warning in scene.environment.iter().flat_map(Environment::warnings) {
+        warnings.push(warning);
+    }
+    scene.warnings = warnings.into_lines();
+    Ok(scene)
+}
+
+/// Warns of what applies to the file as a whole.
+fn warn_of_ignored(document: &Document, options: &LoadOptions, warnings: &mut Warnings) {
+    let root = &document.root;
+    for extension in &root.extensions_used {
+        if !extensions::SUPPORTED.contains(&extension.as_str()) {
+            warnings.push(format!(
+                "the extension {} isn't supported and is ignored, so that what it describes looks as it does without it, as in other \
+                 viewers that don't know it",
+                quote(extension)
+            ));
+        }
+    }
+    if !root.animations.is_empty() && options.frame_time.is_none() {
+        warnings.push(
+            "its animations need a time (--frame-time SECONDS); everything is rendered as it stands at rest".into(),
+        );
+    }
+}

@@ -1,0 +1,237 @@
+//! Textures: which places of which images a material looks its values up at.
+
+use crate::loader::extensions::{BASISU, WEBP};
+use crate::scene::Textures;
+use std::collections::HashMap;
+use std::path::Path;
+
+use gltf::json;
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::texture::{MagFilter, WrappingMode};
+use gltf::json::validation::Checked;
+
+use super::diagnostic::{Check, damaged, label};
+use super::file::document::Document;
+use super::file::image::Pixels;
+use crate::layout::{CLAMP, MIRROR_REPEAT, NEAREST, REPEAT, SECOND_SET, SRGB, TextureLookup, WRAP_U, WRAP_V};
+use crate::text::list;
+
+/// Source of a texture that names no image.
+const NO_SOURCE: usize = u32::MAX as usize;
+
+/// What a material says of one of its textures, whatever it is for.
+#[derive(Debug, Clone)]
+pub(crate) struct TextureUse {
+    /// Index of the texture.
+    pub texture: usize,
+    /// Set of coordinates.
+    pub set: u32,
+    pub transform: Option<TextureTransform>,
+    /// Whether its colours are sRGB.
+    pub srgb: bool,
+}
+
+/// Collects the textures that materials use.
+pub(crate) struct TextureReader<'a> {
+    document: &'a Document,
+    folder: &'a Path,
+    textures: Textures,
+    /// First texel and size of each image that has been read; `None` of one that can't be.
+    images: HashMap<usize, Option<[u32; 2]>>,
+}
+
+impl<'a> TextureReader<'a> {
+    /// Reads textures of a file in `folder`.
+    pub(crate) fn new(document: &'a Document, folder: &'a Path) -> Self {
+        Self {
+            document,
+            folder,
+            textures: Textures::default(),
+            images: HashMap::new(),
+        }
+    }
+
+    /// All that have been read.
+    pub(crate) fn finish(self) -> Textures {
+        self.textures
+    }
+
+    /// Index of a lookup; `None`, with a warning, for an image that can't be read.
+    pub(crate) fn lookup(&mut self, wanted: &TextureUse, warnings: &mut Vec<String>) -> Check<Option<u32>> {
+        let root = &self.document.root;
+        let textures = &root.textures;
+        let texture = textures.get(wanted.texture).ok_or_else(|| {
+            damaged(format_args!(
+                "there is no texture {}, the file has {}",
+                wanted.texture,
+                textures.len()
+            ))
+        })?;
+        let Some([first_texel, size]) = self.image(wanted.texture, texture, warnings)? else {
+            return Ok(None);
+        };
+        let sampler = texture.sampler.map(|sampler| {
+            root.samplers.get(sampler.value()).ok_or_else(|| {
+                damaged(format_args!(
+                    "there is no sampler {sampler}, the file has {}",
+                    root.samplers.len()
+                ))
+            })
+        });
+        let sampler = sampler.transpose()?;
+        let wrap = |mode: Option<&Checked<WrappingMode>>| match mode {
+            Some(Checked::Valid(WrappingMode::ClampToEdge)) => CLAMP,
+            Some(Checked::Valid(WrappingMode::MirroredRepeat)) => MIRROR_REPEAT,
+            _ => REPEAT,
+        };
+        let nearest = sampler.is_some_and(|sampler| sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest)));
+        let transform = wanted.transform.as_ref();
+        let set = transform
+            .and_then(|transform| transform.tex_coord)
+            .unwrap_or(wanted.set);
+        if set > 1 {
+            warnings.push(format!(
+                "its TEXCOORD_{set} isn't read, only sets 0 and 1 are; set 0 is used, and the texture lies elsewhere than meant: export \
+                 it with set 0 or 1"
+            ));
+        }
+        let [row_u, row_v] = rows(transform)?;
+        let lookup = TextureLookup {
+            row_u,
+            first_texel,
+            row_v,
+            size,
+            flags: if set == 1 { SECOND_SET } else { 0 }
+                | if wanted.srgb { SRGB } else { 0 }
+                | if nearest { NEAREST } else { 0 }
+                | wrap(sampler.map(|sampler| &sampler.wrap_s)) << WRAP_U
+                | wrap(sampler.map(|sampler| &sampler.wrap_t)) << WRAP_V,
+            padding0: 0,
+            padding1: 0,
+            padding2: 0,
+        };
+        let lookups = &mut self.textures.lookups;
+        let known = lookups.iter().position(|known| *known == lookup);
+        Ok(Some(known.unwrap_or_else(|| {
+            lookups.push(lookup);
+            lookups.len() - 1
+        }) as u32))
+    }
+}
+
+impl TextureReader<'_> {
+    /// First texel and size of the image of a texture: the first one that can be read of those that it names.
+    fn image(&mut self, index: usize, texture: &json::Texture, warnings: &mut Vec<String>) -> Check<Option<[u32; 2]>> {
+        let images = &self.document.root.images;
+        let named = sources(texture);
+        if named.is_empty() {
+            let extensions = texture.extensions.as_ref();
+            let extensions: Vec<String> =
+                extensions.map_or(Vec::new(), |extensions| extensions.others.keys().cloned().collect());
+            warnings.push(format!(
+                "texture {index} has no image but by {}, which isn't supported; it is left out",
+                if extensions.is_empty() {
+                    "nothing".to_owned()
+                } else {
+                    list(&extensions)
+                }
+            ));
+        }
+        for (place, &source) in named.iter().enumerate() {
+            let image = images.get(source).ok_or_else(|| {
+                damaged(format_args!(
+                    "there is no image {source}, the file has {}",
+                    images.len()
+                ))
+            })?;
+            if let Some(known) = self.images.get(&source) {
+                if known.is_some() {
+                    return Ok(*known);
+                }
+                continue;
+            }
+            match Pixels::read(self.document, image, self.folder) {
+                Ok(pixels) => {
+                    let added = Some(self.add(&pixels)?);
+                    self.images.insert(source, added);
+                    return Ok(added);
+                }
+                Err(what) => {
+                    self.images.insert(source, None);
+                    let instead = match named.get(place + 1) {
+                        Some(fallback) => format!("image {fallback} stands for it"),
+                        None => "its textures are left out, and materials have their factors alone".to_owned(),
+                    };
+                    let label = label("image", source, image.name.as_deref());
+                    warnings.push(format!("{label}: {what}; {instead}"));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Adds an image; returns its first texel and its size.
+    fn add(&mut self, pixels: &Pixels) -> Check<[u32; 2]> {
+        let texels = &mut self.textures.texels;
+        let first = first_texel(texels.len() as u64, pixels.rgba.len() as u64)?;
+        texels.extend(pixels.rgba.iter().map(|rgba| u32::from_le_bytes(*rgba)));
+        Ok([first, pixels.width | pixels.height << 16])
+    }
+}
+
+/// Where an image of so many texels begins after those of the others. Kernels count texels in 32 bits.
+fn first_texel(before: u64, count: u64) -> Check<u32> {
+    let most = u64::from(u32::MAX);
+    let fits = before.checked_add(count).is_some_and(|all| all <= most);
+    u32::try_from(before).ok().filter(|_| fits).ok_or_else(|| {
+        format!(
+            "its images have {before} texels and {count} more, of which {most} at the most are read; make them smaller"
+        )
+    })
+}
+
+/// The images that a texture names, each to stand for those before it: what extensions name is better than what is there for
+/// programs that don't know them.
+fn sources(texture: &json::Texture) -> Vec<usize> {
+    let extensions = texture.extensions.as_ref();
+    let of_extension = |name| {
+        let source = extensions?.others.get(name)?.get("source")?.as_u64()?;
+        Some(usize::try_from(source).unwrap_or(NO_SOURCE))
+    };
+    let plain = Some(texture.source.value()).filter(|&source| source != NO_SOURCE);
+    [of_extension(WEBP), of_extension(BASISU), plain]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// KHR_texture_transform: offset · rotation · scale.
+fn rows(transform: Option<&TextureTransform>) -> Check<[[f32; 3]; 2]> {
+    let Some(transform) = transform else {
+        return Ok([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    };
+    let ([x, y], [w, h]) = (transform.offset.0, transform.scale.0);
+    let (sin, cos) = f64::from(transform.rotation.0).sin_cos();
+    let (sin, cos) = (sin as f32, cos as f32);
+    let rows = [[cos * w, sin * h, x], [-sin * w, cos * h, y]];
+    if rows.as_flattened().iter().all(|value| value.is_finite()) {
+        Ok(rows)
+    } else {
+        Err(damaged("its KHR_texture_transform isn't finite"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_beyond_what_32_bits_count_are_refused() {
+        assert_eq!(first_texel(0, 1), Ok(0));
+        assert_eq!(first_texel((1 << 32) - 5, 4), Ok(u32::MAX - 4));
+        for (before, count) in [((1 << 32) - 5, 5), (1 << 32, 1), (1, u64::MAX), (u64::MAX, 1)] {
+            let error = first_texel(before, count).expect_err("more than 32 bits count");
+            assert!(error.contains("4294967295 at the most"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Lamps that a file has twice in one place: a ray meets one of them, so that one alone is a light.
+
+use std::collections::{HashMap, HashSet};
+
+use glam::Vec3;
+
+use super::EmissiveTriangle;
+use super::shine::Shine;
+use crate::scene::Scene;
+
+/// Where a triangle lies, whichever of its corners comes first, what it is made of, and which way it looks if that matters.
+type Place = ([[u32; 3]; 3], u32, bool);
+
+fn place_of(scene: &Scene, triangle: u32) -> Place {
+    let object = &scene.objects[scene.triangles[triangle as usize].object as usize];
+    // −0 and 0 are one place.
+    let corners = scene
+        .corners_of(triangle)
+        .map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
+    let mut sorted = corners;
+    sorted.sort_unstable();
+    // An even permutation keeps the side that it looks to.
+    let place = |corner: &[u32; 3]| sorted.iter().position(|other| other == corner);
+    let [a, b, c] = [0, 1, 2].map(|i| place(&corners[i]));
+    let inversions = [a > b, a > c, b > c].into_iter().filter(|inverted| *inverted).count();
+    let two_sided = scene.materials[object.material as usize].back_emits;
+    (sorted, object.material, !two_sided && inversions % 2 == 1)
+}
+
+/// Takes out those that lie where another one of their material shines evenly to the same sides. Returns, of each, which it is
+/// and which one stays: that of the last object, which is what rays meet.
+pub(crate) fn take_doubles(scene: &Scene, shining: &mut Vec<(EmissiveTriangle, Shine)>) -> Vec<[u32; 2]> {
+    let mut stay: HashMap<Place, u32> = HashMap::new();
+    let even = shining.iter().rev().filter(|(_, shine)| shine.columns == 1);
+    let with_those_that_stay = even.map(|(light, _)| {
+        let stays = stay.entry(place_of(scene, light.triangle)).or_insert(light.triangle);
+        [light.triangle, *stays]
+    });
+    let doubles: Vec<[u32; 2]> = with_those_that_stay.filter(|[light, stays]| light != stays).collect();
+    let gone: HashSet<u32> = doubles.iter().map(|[light, _]| *light).collect();
+    shining.retain(|(light, _)| !gone.contains(&light.triangle));
+    doubles
+}

@@ -1,0 +1,56 @@
+//! Area lights: the triangles whose material emits.
+
+use super::shine::Shine;
+use crate::scene::Scene;
+
+/// A triangle that emits light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EmissiveTriangle {
+    /// Index into [`Scene::triangles`].
+    pub triangle: u32,
+    /// Its area, in square render units.
+    pub area: f64,
+    /// Emitted power: mean of the RGB radiance × π × area, twice that if both sides emit. Always positive.
+    pub power: f64,
+}
+
+impl Scene {
+    /// How many triangles emit light.
+    pub fn emissive_triangle_count(&self) -> usize {
+        self.emitting_objects().map(|(object, _)| object.triangles.len()).sum()
+    }
+
+    /// The triangles that emit light, in the order of [`Scene::triangles`].
+    ///
+    /// Photons are emitted, and lights sampled, nearly in proportion to their powers.
+    pub fn emissive_triangles(&self) -> Vec<EmissiveTriangle> {
+        self.shining_triangles()
+            .0
+            .into_iter()
+            .map(|(emissive, _)| emissive)
+            .collect()
+    }
+
+    /// Each with the way it shines over its area, and whether some would have to be known more finely than they are.
+    pub(crate) fn shining_triangles(&self) -> (Vec<(EmissiveTriangle, Shine)>, bool) {
+        let even: Vec<EmissiveTriangle> = self
+            .emitting_objects()
+            .flat_map(|(object, exitance)| {
+                object.triangles.clone().map(move |triangle| {
+                    let area = self.triangle_area(triangle);
+                    EmissiveTriangle {
+                        triangle,
+                        area,
+                        power: exitance * area,
+                    }
+                })
+            })
+            .collect();
+        let (shines, is_coarse) = Shine::of_all(self, &even);
+        let shining = |(even, shine): (EmissiveTriangle, Shine)| {
+            let power = even.power * shine.mean;
+            (EmissiveTriangle { power, ..even }, shine)
+        };
+        (even.into_iter().zip(shines).map(shining).collect(), is_coarse)
+    }
+}

@@ -1,0 +1,75 @@
+//! Where a light is near: there the squared distance to its points varies without bound, and directions of the BSDF are the
+//! better way to sample it. Anywhere else points of the light alone are better, since no ray is lost.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::part::Part;
+use super::sphere::Sphere;
+use crate::layout::{ENVIRONMENT_LIGHT, Light, TRIANGLE_LIGHT};
+use crate::scene::Environment;
+
+/// Radii of a light within which it is near: outside of it no point of it is more than three times as far as another one.
+const REACH: f64 = 2.0;
+/// The least and the greatest probability that a direction of the BSDF is taken near a light.
+const SAMPLING: [f64; 2] = [0.05, 0.5];
+
+/// Spheres in which lights are near.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NearLights<'a> {
+    pub lights: &'a [Light],
+    /// What each emits; 0 of what is surely dark.
+    pub powers: &'a [f64],
+    /// Ranges of them.
+    pub sources: &'a [Range<u32>],
+    /// Of all triangles, in the order of the BVH's leaves.
+    pub corners: &'a [[Vec3; 3]],
+    pub environment: Option<&'a Environment>,
+}
+
+impl NearLights<'_> {
+    /// A sphere around each source that rays can meet: its centre, and the squared radius of what is near it. An environment is
+    /// near everywhere.
+    pub fn spheres(&self) -> Vec<[f32; 4]> {
+        if self.environment.is_some() {
+            return vec![[0.0, 0.0, 0.0, f32::INFINITY]];
+        }
+        let sphere = |source: &Range<u32>| match self.lights[source.start as usize].kind {
+            TRIANGLE_LIGHT => self.around(source),
+            _ => None,
+        };
+        self.sources.iter().filter_map(sphere).collect()
+    }
+
+    /// Those of a range that shine.
+    fn shining(&self, range: Range<usize>) -> impl Iterator<Item = &Light> + Clone {
+        let with_powers = self.lights[range.clone()].iter().zip(&self.powers[range]);
+        with_powers.filter(|(_, power)| **power > 0.0).map(|(light, _)| light)
+    }
+
+    fn around(&self, source: &Range<u32>) -> Option<[f32; 4]> {
+        let of_light =
+            |light: &Light| Part::of(light).corners(self.corners[light.triangle as usize].map(Vec3::as_dvec3));
+        let lights = self.shining(source.start as usize..source.end as usize);
+        let sphere = Sphere::around(lights.flat_map(of_light))?;
+        let radius2 = (REACH * sphere.radius).powi(2);
+        Some(sphere.centre.as_vec3().extend(radius2 as f32).to_array())
+    }
+
+    /// Probability that a direction of the BSDF is taken near a light: about the chance that it meets one. That is the part of
+    /// the scene's area that emits, or of all directions that the environment's light comes from, half of which lie below a
+    /// surface.
+    pub fn bsdf_sampling(&self, area_of_all: f64) -> f32 {
+        let environments = self.lights.iter().filter(|light| light.kind == ENVIRONMENT_LIGHT);
+        let from_afar: f64 = environments
+            .zip(self.environment)
+            .map(|(light, environment)| f64::from(light.probability) * environment.spread())
+            .sum();
+        let triangles = self
+            .shining(0..self.lights.len())
+            .filter(|light| light.kind == TRIANGLE_LIGHT);
+        let emissive: f64 = triangles.map(|light| f64::from(light.area)).sum();
+        (emissive / area_of_all + 0.5 * from_afar).clamp(SAMPLING[0], SAMPLING[1]) as f32
+    }
+}
