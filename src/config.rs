@@ -1,13 +1,8 @@
-//! What the user asked for, and every buffer size and group count that follows from it.
+//! What the user asked for.
 
 pub mod ranges;
-mod sizes;
 mod tiles;
 
-pub use sizes::{
-    EXHAUSTIVE_RANGE, LLOYD_ROUNDS, Limits, MOST_EMISSION_CELLS, MOST_TARGETS, PPM_SLOTS, Probe, SORT_DIGIT_BITS,
-    Sizes, clustered_run,
-};
 pub use tiles::pixel_of;
 
 use std::fmt::Display;

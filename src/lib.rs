@@ -37,5 +37,6 @@ pub mod record;
 pub mod report;
 pub mod scene;
 pub mod shaders;
+pub mod sizes;
 pub mod stage;
 pub mod text;

@@ -9,10 +9,11 @@ mod fixture;
 mod picture;
 
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Estimator, Limits, RenderConfig, Sizes, Totals};
+use ppm_vk::config::{Estimator, RenderConfig, Totals};
 use ppm_vk::gpu::best_device;
 use ppm_vk::packing::SceneFeatures;
 use ppm_vk::pipeline::{Memory, Stages};
+use ppm_vk::sizes::{Limits, Sizes};
 use serde_json::json;
 
 use fixture::Fixture;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::median;
 use super::structure::{Structure, structure};
 use crate::backend::{Backend, DeviceDescription};
-use crate::config::{Probe, RenderConfig, Sizes, Totals};
+use crate::config::{RenderConfig, Totals};
 use crate::cpu::{self, Counts, Inputs};
 use crate::emission::Aim;
 use crate::error::{Error, Result};
@@ -19,6 +19,7 @@ use crate::packing::PackedScene;
 use crate::pipeline::Renderer;
 use crate::record::Run;
 use crate::scene::Camera;
+use crate::sizes::{Probe, Sizes};
 use crate::stage::BufferId;
 
 /// Microseconds that one gather may take; a slower method is measured on a share of the visible points.

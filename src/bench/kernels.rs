@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use crate::config::clustered_run;
 use crate::error::Result;
 use crate::gpu::Compiler;
 use crate::packing::SceneFeatures;
 use crate::shaders;
+use crate::sizes::clustered_run;
 use crate::stage::{Shader, StageDesc};
 
 /// Kernels compiled for one set of features.

@@ -5,12 +5,13 @@ use serde::Serialize;
 use super::gather::GatherBench;
 use super::{log_slope, median};
 use crate::backend::{Backend, DeviceDescription};
-use crate::config::{Probe, RenderConfig};
+use crate::config::RenderConfig;
 use crate::error::{Error, Result};
 use crate::gather::METHODS;
 use crate::gpu::Device;
 use crate::pipeline::Renderer;
 use crate::record::Run;
+use crate::sizes::Probe;
 
 /// Photon paths of an iteration.
 const PHOTONS: [u32; 7] = [10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000];

@@ -11,12 +11,13 @@ use super::outputs::{all, check_outputs, named};
 use super::scene::{SceneArguments, say_remarks};
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
-use crate::config::{EmissionChoice, Probe, RenderConfig};
+use crate::config::{EmissionChoice, RenderConfig};
 use crate::film::{write_png, write_whole};
 use crate::gather::{METHODS, method};
 use crate::packing::PackedScene;
 use crate::packing::SceneFeatures;
 use crate::scene::Scene;
+use crate::sizes::Probe;
 
 /// What is measured where the user names no scene.
 const CORNELL: [(&str, &[u8]); 2] = [

@@ -10,7 +10,7 @@ use super::{
     shell_radii, update,
 };
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, demand_floor2, settings};
-use crate::config::{EmissionChoice, Estimator, Limits, RenderConfig, SEQUENCES, Sizes, Totals};
+use crate::config::{EmissionChoice, Estimator, RenderConfig, SEQUENCES, Totals};
 use crate::emission::{Aim, is_learned_from};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
@@ -20,6 +20,7 @@ use crate::radius;
 use crate::random::CameraTurn;
 use crate::record::{Launch, Run};
 use crate::scene::Camera;
+use crate::sizes::{Limits, Sizes};
 
 /// Lanes that a batch's photon paths are dealt to, whatever the number of threads. As many as on a CPU's Vulkan
 /// device, so that both give the photons in the same order.

@@ -8,11 +8,12 @@ use super::strata::{Stratum, strata};
 use super::table::{Chosen, DIMENSIONS, Table};
 use super::targets::targets;
 use crate::alias::alias_table;
-use crate::config::{MOST_EMISSION_CELLS, RenderConfig};
+use crate::config::RenderConfig;
 use crate::layout::{EmissionCell, VisiblePoint};
 use crate::packing::PackedScene;
 use crate::radius;
 use crate::random::Random;
+use crate::sizes::MOST_EMISSION_CELLS;
 
 /// Rounds of learning before the first iteration, each of a quarter of its paths.
 const PILOT_ROUNDS: u32 = 4;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3};
 
 use super::strata::extent_of;
-use crate::config::MOST_TARGETS;
 use crate::layout::{
     DIELECTRIC, FOLLOWED_ALPHA, GLOSSY_SURFACE, Light, MIRROR, Material, NO_OBJECT, POINT_LIGHT, SPOT_LIGHT,
     ShadingTriangle, VisiblePoint,
@@ -13,6 +12,7 @@ use crate::layout::{
 use crate::packing::PackedScene;
 use crate::packing::Sphere;
 use crate::scene::Placement;
+use crate::sizes::MOST_TARGETS;
 
 /// Spheres around specular objects at the most.
 const MOST_SPECULAR: usize = 12;

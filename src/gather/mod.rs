@@ -7,9 +7,9 @@ mod primitives;
 pub use photons::grid_sizes;
 pub use primitives::{PHOTON_PAIRS, POINT_PAIRS, Pairs, scan, sort};
 
-use crate::config::Sizes;
 use crate::layout::GROUP;
 use crate::record::Recording;
+use crate::sizes::Sizes;
 
 /// Records stages for buffers of these sizes.
 pub type Record = fn(&Sizes, &mut Recording);

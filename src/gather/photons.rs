@@ -1,10 +1,10 @@
 //! Orders of photons, and gathering from them: what is recorded for each batch of photons.
 
 use super::primitives::{PHOTON_PAIRS, scan, sort};
-use crate::config::{EXHAUSTIVE_RANGE, Sizes};
 use crate::layout::GROUP;
 use crate::record::Recording;
 use crate::shaders;
+use crate::sizes::{EXHAUSTIVE_RANGE, Sizes};
 use crate::stage::{BufferId, Shader, StageDesc};
 
 /// How a gather that tests every photon goes about it.

@@ -1,10 +1,10 @@
 //! Orders of visible points: what is recorded when they are new.
 
 use super::primitives::{POINT_PAIRS, scan, sort};
-use crate::config::{LLOYD_ROUNDS, Sizes};
 use crate::layout::{CURVE_BITS, GROUP, NO_SLOT};
 use crate::record::Recording;
 use crate::shaders;
+use crate::sizes::{LLOYD_ROUNDS, Sizes};
 use crate::stage::{BufferId, StageDesc};
 
 /// The order of the slots.

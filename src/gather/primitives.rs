@@ -1,9 +1,9 @@
 //! Prefix sums and sorting, which every ordering on the device is made of.
 
-use crate::config::SORT_DIGIT_BITS;
 use crate::layout::{SCAN_BLOCK, SORT_TILE};
 use crate::record::Recording;
 use crate::shaders;
+use crate::sizes::SORT_DIGIT_BITS;
 use crate::stage::{BufferId, StageDesc};
 
 /// Records the exclusive prefix sums of the first `count` numbers of `buffer`, in place. Their total goes to

@@ -10,7 +10,6 @@ use super::context::{Context, DeviceSummary, Instance};
 use super::descriptors::Descriptors;
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
-use super::self_check;
 use super::submission::Slots;
 use crate::error::{Error, Result};
 use crate::stage::BufferId;
@@ -39,7 +38,7 @@ pub fn best_device() -> Result<DeviceSummary> {
 /// An open device and its buffers.
 pub struct Device {
     pub(super) summary: DeviceSummary,
-    pub(super) loop_limit: u32,
+    pub(super) loop_limit: Option<u32>,
     pub(super) buffers: HashMap<BufferId, Buffer>,
     pub(super) pipelines: Pipelines,
     pub(super) descriptors: Descriptors,
@@ -64,18 +63,16 @@ impl Device {
         let context = Context::new(instance, physical, false)?;
         let slots = Slots::new(&context)?;
         let cache = PipelineCache::open(&context, physical)?;
-        let mut device = Self {
+        Ok(Self {
             summary,
-            loop_limit: u32::MAX,
+            loop_limit: None,
             buffers: HashMap::new(),
             pipelines: Pipelines::new(cache, vk::PipelineCreateFlags::empty()),
             descriptors: Descriptors::default(),
             slots,
             thread_ns: HashMap::new(),
             context,
-        };
-        device.loop_limit = self_check::loop_limit(&mut device)?;
-        Ok(device)
+        })
     }
 
     /// Name, driver, limits.
@@ -86,12 +83,6 @@ impl Device {
     /// Whether the validation layer watches: in debug builds, where it is installed.
     pub fn is_validated(&self) -> bool {
         self.context.instance.is_validated()
-    }
-
-    /// Loop iterations after which the driver ends all loops of an invocation, as measured when the device was
-    /// opened; `u32::MAX` if it doesn't.
-    pub fn loop_limit(&self) -> u32 {
-        self.loop_limit
     }
 
     /// Makes (or makes anew, with undefined content) the buffer `id`.

@@ -9,25 +9,34 @@ use crate::stage::{BufferId, StageDesc};
 /// Mesa's llvmpipe ended loops at 65,535 iterations for years; a driver that does more than this does all.
 const ASKED: u32 = 70_000;
 
-/// Loop iterations that an invocation is really given; `u32::MAX` where it gets all that it asks for.
-pub(super) fn loop_limit(device: &mut Device) -> Result<u32> {
-    device.create(BufferId::ScanTotal, 4)?;
-    let mut recording = Recording::new();
-    recording.dispatch(StageDesc::new(&shaders::LOOP_PROBE, 1).push(ASKED));
-    device.run(&recording)?;
-    let done: Vec<u32> = device.download(BufferId::ScanTotal, Some(1))?;
-    Ok(match done.first() {
-        Some(&done) if done < ASKED => done,
-        _ => u32::MAX,
-    })
-}
-
 /// Bytes that the copy moves in each direction, where the device binds as many.
 const COPIED: u64 = 64 << 20;
 /// Copies, of which the median counts.
 const COPIES: usize = 9;
 
 impl Device {
+    /// Loop iterations after which the driver ends all loops of an invocation; `u32::MAX` if it doesn't. Measured when it is
+    /// first asked.
+    ///
+    /// # Errors
+    /// No memory, or a failed Vulkan call.
+    pub fn loop_limit(&mut self) -> Result<u32> {
+        if let Some(known) = self.loop_limit {
+            return Ok(known);
+        }
+        self.create(BufferId::ScanTotal, 4)?;
+        let mut recording = Recording::new();
+        recording.dispatch(StageDesc::new(&shaders::LOOP_PROBE, 1).push(ASKED));
+        self.run(&recording)?;
+        let done: Vec<u32> = self.download(BufferId::ScanTotal, Some(1))?;
+        let limit = match done.first() {
+            Some(&done) if done < ASKED => done,
+            _ => u32::MAX,
+        };
+        self.loop_limit = Some(limit);
+        Ok(limit)
+    }
+
     /// Bytes a second that a kernel reads and writes when it copies, both counted.
     ///
     /// # Errors

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use super::memory::scene_buffers;
 use super::stages::Stages;
-use crate::config::{Limits, RenderConfig, Sizes, Totals};
+use crate::config::{RenderConfig, Totals};
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceSummary, advice};
 use crate::packing::PackedScene;
 use crate::record::{Command, Recording};
+use crate::sizes::{Limits, Sizes};
 use crate::stage::{Access, BufferId};
 use crate::text;
 

@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 
 use super::stages::Stages;
-use crate::config::{Limits, RenderConfig, Sizes, Totals, TriangleTest, clustered_run};
+use crate::config::{RenderConfig, Totals, TriangleTest};
 use crate::gpu::DeviceSummary;
 use crate::layout::Settings;
 use crate::packing::PackedScene;
+use crate::sizes::{Limits, Sizes, clustered_run};
 use crate::stage::BufferId;
 
 /// Bytes of a device's memory.

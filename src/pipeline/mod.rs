@@ -14,7 +14,7 @@ use memory::{bindable_bytes, limits, scene_buffers};
 pub use stages::Stages;
 
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
-use crate::config::{Accel, Limits, Probe, RenderConfig, Sizes, Totals};
+use crate::config::{Accel, RenderConfig, Totals};
 use crate::emission::Aim;
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, default_method, grid_sizes};
@@ -26,6 +26,7 @@ use crate::packing::SceneFeatures;
 use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
 use crate::scene::Camera;
+use crate::sizes::{Limits, Probe, Sizes};
 use crate::stage::{BufferId, SEQUENCE_FILMS};
 use stages::{method_stages, reporting};
 
@@ -88,10 +89,13 @@ impl Renderer {
                 method.name
             )));
         }
-        let limits = Limits {
+        let within = |loop_limit, device: &Device| Limits {
             storage_buffer_bytes: buffer_bytes,
-            ..limits(device.summary(), device.loop_limit(), scene)
+            ..limits(device.summary(), loop_limit, scene)
         };
+        check_fits(scene, &config, device.summary(), within(u32::MAX, &device))?;
+        let loop_limit = device.loop_limit()?;
+        let limits = within(loop_limit, &device);
         let triangles = scene.seen_triangles();
         if config.accel == Accel::Brute && triangles > u64::from(limits.loop_limit) {
             return Err(Error::Device(format!(
@@ -101,7 +105,6 @@ impl Renderer {
             )));
         }
         let sizes = Sizes::new(&config, limits);
-        check_fits(scene, &config, device.summary(), limits)?;
         for (id, bytes) in scene_buffers(scene, config.triangle_test) {
             device.upload(id, bytes)?;
         }

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
-use crate::config::{Accel, Direct, Estimator, RenderConfig, SEQUENCES, Sizes, Totals, TriangleTest, iterations_of};
+use crate::config::{Accel, Direct, Estimator, RenderConfig, SEQUENCES, Totals, TriangleTest, iterations_of};
 use crate::gather::{METHODS, Record, default_method, grid_sizes, scan};
 use crate::packing::SceneFeatures;
 use crate::random::CameraTurn;
 use crate::record::Recording;
 use crate::shaders;
+use crate::sizes::Sizes;
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS, Shader, StageDesc};
 
 /// The stages of a render, as data: what an iteration runs, without a device.

@@ -2,13 +2,14 @@
 
 use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Probe, RenderConfig};
+use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu::{self, Counts, GatheredWith, Seen};
 use ppm_vk::gather::{self, METHODS};
 use ppm_vk::layout::{Coverage, Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
 use ppm_vk::packing::PackedScene;
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
+use ppm_vk::sizes::Probe;
 use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::agreement::relative_difference;

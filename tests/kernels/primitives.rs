@@ -1,11 +1,11 @@
 //! Prefix sums and sorting: exact.
 
-use ppm_vk::config::SORT_DIGIT_BITS;
 use ppm_vk::cpu;
 use ppm_vk::gather;
 use ppm_vk::gpu::Device;
 use ppm_vk::layout::{SCAN_BLOCK, SORT_TILE};
 use ppm_vk::record::Recording;
+use ppm_vk::sizes::SORT_DIGIT_BITS;
 use ppm_vk::stage::BufferId;
 
 fn device() -> Device {

@@ -2,11 +2,12 @@
 
 use bytemuck::Zeroable;
 use glam::Vec3;
-use ppm_vk::config::{Direct, EmissionChoice, Probe, RenderConfig};
+use ppm_vk::config::{Direct, EmissionChoice, RenderConfig};
 use ppm_vk::cpu;
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{Gathered, Photon, Statistics, VisiblePoint};
 use ppm_vk::scene::Scene;
+use ppm_vk::sizes::Probe;
 use ppm_vk::stage::BufferId;
 
 use super::bench::{Bench, object, photon, random_numbers, visible_point, xyz};

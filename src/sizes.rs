@@ -1,6 +1,6 @@
 //! Every buffer size and group count, and the numbers that they follow from.
 
-use super::{EmissionChoice, Estimator, RenderConfig};
+use crate::config::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
     BehindGlass, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, Gloss, GridShape, PathStart, Photon,
     SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters, TILE, VisiblePoint,
