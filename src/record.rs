@@ -2,7 +2,6 @@
 //! earlier one read. Knows no Vulkan, so that the hazards of a whole iteration are tested without a device.
 
 use std::collections::{BTreeSet, HashMap};
-use std::ops::Range;
 use std::time::Duration;
 
 use crate::stage::{BufferId, StageDesc};
@@ -33,6 +32,17 @@ impl Command {
             Self::Barrier => Vec::new(),
         }
     }
+}
+
+/// A command, or one of the pieces that a long launch is divided into.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Piece {
+    /// The command's place in [`Recording::commands`].
+    pub index: usize,
+    /// Which of its pieces it is.
+    pub place: u32,
+    /// How many there are.
+    pub count: u32,
 }
 
 /// Commands in order, barriers included.
@@ -66,21 +76,31 @@ impl Recording {
         self.push(Command::ReadBack(buffer, bytes));
     }
 
-    /// Parts of the commands that take no longer than `most_ns` each, where no single launch does. `expected_ns` is what a launch
-    /// is expected to take: one of which that isn't known is a part of its own.
-    pub fn parts(&self, most_ns: f64, expected_ns: impl Fn(&StageDesc) -> Option<f64>) -> Vec<Range<usize>> {
-        let mut parts = Vec::new();
-        let (mut begin, mut sum) = (0, 0.0);
-        for (i, command) in self.commands.iter().enumerate() {
-            let Command::Dispatch(stage) = command else { continue };
-            let expected = expected_ns(stage).unwrap_or(most_ns);
-            if sum > 0.0 && sum + expected > most_ns {
-                parts.push(begin..i);
-                (begin, sum) = (i, 0.0);
+    /// Parts of the commands that take no longer than about `most_ns` each; a launch that takes longer is divided among several.
+    /// `expected_ns` is what a launch is expected to take: one of which that isn't known is a part of its own.
+    pub fn parts(&self, most_ns: f64, expected_ns: impl Fn(&StageDesc) -> Option<f64>) -> Vec<Vec<Piece>> {
+        let mut parts = vec![Vec::new()];
+        let mut sum = 0.0;
+        for (index, command) in self.commands.iter().enumerate() {
+            let (expected, count) = match command {
+                Command::Dispatch(stage) => {
+                    let all = expected_ns(stage).unwrap_or(most_ns);
+                    let count = (all / most_ns).ceil().clamp(1.0, f64::from(stage.groups()));
+                    (all / count, count as u32)
+                }
+                _ => (0.0, 1),
+            };
+            for place in 0..count {
+                if sum > 0.0 && sum + expected > most_ns * (1.0 + 1e-9) && expected > 0.0 {
+                    parts.push(Vec::new());
+                    sum = 0.0;
+                }
+                sum += expected;
+                if let Some(part) = parts.last_mut() {
+                    part.push(Piece { index, place, count });
+                }
             }
-            sum += expected;
         }
-        parts.push(begin..self.commands.len());
         parts
     }
 
@@ -156,32 +176,73 @@ mod tests {
         recording
     }
 
-    /// Threads of each part's launches, where a launch takes as many nanoseconds.
-    fn parts(launches: &[u32], is_known: impl Fn(u32) -> bool) -> Vec<Vec<u32>> {
+    /// Threads of each part's launches, where a launch takes as many nanoseconds, over how many pieces they are divided into.
+    fn parts(launches: &[u32], is_known: impl Fn(u32) -> bool) -> Vec<Vec<(u32, u32)>> {
         let recording = recording(launches);
         let expected = |stage: &StageDesc| is_known(stage.threads).then(|| f64::from(stage.threads));
-        let parts = recording.parts(100.0, expected);
-        let mut end = 0;
-        for part in &parts {
-            assert_eq!(part.start, end, "the parts have each command once, in order");
-            end = part.end;
+        let parts = recording.parts(1000.0, expected);
+        let mut next = (0, 0);
+        for piece in parts.iter().flatten() {
+            assert_eq!(
+                (piece.index, piece.place),
+                next,
+                "each piece of each command comes once, in order"
+            );
+            let is_last = piece.place + 1 == piece.count;
+            next = if is_last {
+                (piece.index + 1, 0)
+            } else {
+                (piece.index, piece.place + 1)
+            };
         }
-        assert_eq!(end, recording.commands().len());
-        let threads = |command: &Command| match command {
-            Command::Dispatch(stage) => Some(stage.threads),
+        assert_eq!(next, (recording.commands().len(), 0));
+        let launch = |piece: &Piece| match &recording.commands()[piece.index] {
+            Command::Dispatch(stage) => Some((stage.threads, piece.count)),
             _ => None,
         };
-        let of = |part: Range<usize>| recording.commands()[part].iter().filter_map(threads).collect();
-        parts.into_iter().map(of).collect()
+        parts
+            .iter()
+            .map(|part| part.iter().filter_map(launch).collect())
+            .collect()
     }
 
     #[test]
     fn work_is_parted_where_it_would_take_too_long() {
-        assert_eq!(parts(&[], |_| true), [vec![0u32; 0]]);
-        assert_eq!(parts(&[40, 60], |_| true), [vec![40, 60]]);
+        assert_eq!(parts(&[], |_| true), [vec![]]);
+        assert_eq!(parts(&[400, 600], |_| true), [vec![(400, 1), (600, 1)]]);
         assert_eq!(
-            parts(&[40, 60, 1, 250, 10, 80, 20], |_| true),
-            [vec![40, 60], vec![1], vec![250], vec![10, 80], vec![20]]
+            parts(&[400, 600, 10, 100, 800, 200], |_| true),
+            [
+                vec![(400, 1), (600, 1)],
+                vec![(10, 1), (100, 1), (800, 1)],
+                vec![(200, 1)]
+            ]
+        );
+    }
+
+    #[test]
+    fn a_launch_that_would_take_too_long_is_divided() {
+        assert_eq!(
+            parts(&[10, 2500, 100], |_| true),
+            [
+                vec![(10, 1)],
+                vec![(2500, 3)],
+                vec![(2500, 3)],
+                vec![(2500, 3), (100, 1)]
+            ]
+        );
+    }
+
+    #[test]
+    fn no_launch_is_divided_into_more_pieces_than_it_has_workgroups() {
+        let recording = recording(&[100]);
+        let parts = recording.parts(1.0, |_| Some(1e9));
+        let pieces = parts.iter().flatten().filter(|piece| piece.count > 1).count();
+        assert_eq!(
+            pieces,
+            2,
+            "100 invocations are two workgroups of {}",
+            shaders::RADII.workgroup
         );
     }
 
@@ -189,7 +250,13 @@ mod tests {
     fn a_launch_that_was_never_timed_is_alone() {
         assert_eq!(
             parts(&[10, 20, 7, 30, 7, 7], |threads| threads != 7),
-            [vec![10, 20], vec![7], vec![30], vec![7], vec![7]]
+            [
+                vec![(10, 1), (20, 1)],
+                vec![(7, 1)],
+                vec![(30, 1)],
+                vec![(7, 1)],
+                vec![(7, 1)]
+            ]
         );
     }
 }

@@ -1,7 +1,5 @@
 //! Recordings to Vulkan commands, with a timestamp on both sides of every launch.
 
-use std::ops::Range;
-
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
@@ -9,9 +7,9 @@ use super::buffer::Buffer;
 use super::context::{Context, OrVulkan};
 use super::device::Device;
 use super::pipeline::Pipeline;
-use super::submission::{barrier, barrier_to_host};
+use super::submission::{SlotLaunch, barrier, barrier_to_host};
 use crate::error::{Error, Result};
-use crate::record::{Command, Launch, Recording, Run};
+use crate::record::{Command, Launch, Piece, Recording, Run};
 use crate::stage::{BufferId, StageDesc};
 
 /// Nanoseconds of work that one submission should have at the most: drivers take a device for dead after 2 to 10 seconds,
@@ -88,14 +86,28 @@ impl Device {
                 Command::Dispatch(_) | Command::Barrier => {}
             }
         }
+        let parts = recording.parts(MOST_NS, |stage| self.expected_ns(stage));
+        let pieces_of_launches: Vec<u32> = parts
+            .iter()
+            .flatten()
+            .filter(|piece| piece.place == 0 && matches!(commands[piece.index], Command::Dispatch(_)))
+            .map(|piece| piece.count)
+            .collect();
         let (slot, context) = self.slot(index);
-        slot.make_queries(context, 2 * stages.len() as u32)?;
+        slot.make_queries(context, 2 * pieces_of_launches.iter().sum::<u32>())?;
         for &(id, bytes) in &reads {
             slot.make_read_back(context, id, bytes)?;
         }
         slot.reads = reads;
-        slot.launches = stages.iter().map(|stage| (stage.shader.name, stage.threads)).collect();
-        let parts = recording.parts(MOST_NS, |stage| self.expected_ns(stage));
+        slot.launches = stages
+            .iter()
+            .zip(&pieces_of_launches)
+            .map(|(stage, &pieces)| SlotLaunch {
+                stage: stage.shader.name,
+                threads: stage.threads,
+                pieces,
+            })
+            .collect();
         self.record(index, commands, &parts, &bound)?;
         Ok(Ticket(index))
     }
@@ -104,7 +116,7 @@ impl Device {
         &mut self,
         slot: usize,
         commands: &[Command],
-        parts: &[Range<usize>],
+        parts: &[Vec<Piece>],
         bound: &[(Pipeline, vk::DescriptorSet)],
     ) -> Result<()> {
         let handles: Vec<vk::Buffer> = commands
@@ -115,25 +127,27 @@ impl Device {
             })
             .collect();
         let (of_slot, _) = self.slot(slot);
-        let queries = of_slot.queries;
+        let (queries, query_count) = (of_slot.queries, of_slot.query_count());
         let targets: Vec<(vk::Buffer, u64)> = of_slot
             .reads
             .iter()
             .map(|(id, bytes)| (of_slot.read_back[id].handle, *bytes))
             .collect();
-        let (mut launch, mut read) = (0, 0);
+        let (mut launch, mut query, mut read) = (0, 0, 0);
         self.submit(slot, parts.len(), |context, into, part| {
             let device = &context.device;
             // SAFETY: pipelines, sets and buffers live until the submission has been waited for.
             unsafe {
-                if part == 0 && !bound.is_empty() {
-                    device.cmd_reset_query_pool(into, queries, 0, 2 * bound.len() as u32);
+                if part == 0 && query_count > 0 {
+                    device.cmd_reset_query_pool(into, queries, 0, query_count);
                 }
-                for i in parts[part].clone() {
+                for piece in &parts[part] {
+                    let i = piece.index;
                     match &commands[i] {
                         Command::Dispatch(stage) => {
-                            dispatch(context, into, stage, bound[launch], (queries, launch as u32));
-                            launch += 1;
+                            dispatch(context, into, (stage, *piece), bound[launch], (queries, query));
+                            query += 2;
+                            launch += usize::from(piece.place + 1 == piece.count);
                         }
                         Command::Fill(_, word) => {
                             device.cmd_fill_buffer(into, handles[i], 0, vk::WHOLE_SIZE, *word);
@@ -166,7 +180,7 @@ impl Device {
         let wall = self.slots.waited - begin;
         let launches = self.launches(ticket.0)?;
         let (slot, _) = self.slot(ticket.0);
-        let threads: Vec<u32> = slot.launches.iter().map(|(_, threads)| *threads).collect();
+        let threads: Vec<u32> = slot.launches.iter().map(|launch| launch.threads).collect();
         let reads = std::mem::take(&mut slot.reads);
         let read = reads
             .into_iter()
@@ -206,7 +220,7 @@ impl Device {
         if slot.launches.is_empty() {
             return Ok(Vec::new());
         }
-        let mut ticks = vec![0u64; 2 * slot.launches.len()];
+        let mut ticks = vec![0u64; slot.query_count() as usize];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the queries were written by work that has been waited for.
         unsafe {
@@ -215,16 +229,17 @@ impl Device {
                 .get_query_pool_results(slot.queries, 0, &mut ticks, flags)
         }
         .or_vulkan("vkGetQueryPoolResults")?;
-        Ok(slot
-            .launches
-            .iter()
-            .zip(ticks.chunks_exact(2))
-            .map(|((stage, _), ticks)| Launch {
-                stage,
-                begin_ns: (ticks[0] & mask) as f64 * period,
-                duration_ns: (ticks[1].wrapping_sub(ticks[0]) & mask) as f64 * period,
-            })
-            .collect())
+        let mut rest = ticks.chunks_exact(2);
+        let timed = |launch: &SlotLaunch| {
+            let pieces: Vec<&[u64]> = rest.by_ref().take(launch.pieces as usize).collect();
+            let taken = |ticks: &&[u64]| (ticks[1].wrapping_sub(ticks[0]) & mask) as f64 * period;
+            Launch {
+                stage: launch.stage,
+                begin_ns: (pieces[0][0] & mask) as f64 * period,
+                duration_ns: pieces.iter().map(taken).sum(),
+            }
+        };
+        Ok(slot.launches.iter().map(timed).collect())
     }
 
     /// The first `count` elements of the buffer `id`; all where `count` is `None`.
@@ -268,13 +283,13 @@ impl Device {
     }
 }
 
-/// Records a launch between two timestamps.
+/// Records a piece of a launch between two timestamps.
 fn dispatch(
     context: &Context,
     commands: vk::CommandBuffer,
-    stage: &StageDesc,
+    (stage, piece): (&StageDesc, Piece),
     (pipeline, set): (Pipeline, vk::DescriptorSet),
-    (queries, launch): (vk::QueryPool, u32),
+    (queries, query): (vk::QueryPool, u32),
 ) {
     let device = &context.device;
     let compute = vk::PipelineBindPoint::COMPUTE;
@@ -288,16 +303,16 @@ fn dispatch(
             device.cmd_push_constants(commands, pipeline.layout, flags, 0, &stage.push);
         }
         let all = vk::PipelineStageFlags::ALL_COMMANDS;
-        device.cmd_write_timestamp(commands, all, queries, 2 * launch);
-        let [columns, rows] = layout_of(stage.groups());
-        device.cmd_dispatch(commands, columns, rows, 1);
-        device.cmd_write_timestamp(commands, all, queries, 2 * launch + 1);
+        device.cmd_write_timestamp(commands, all, queries, query);
+        let [columns, rows] = layout_of(stage.groups(), piece.count);
+        device.cmd_dispatch_base(commands, 0, piece.place * rows, 0, columns, rows, 1);
+        device.cmd_write_timestamp(commands, all, queries, query + 1);
     }
     context.end_label(commands);
 }
 
-/// Workgroups in rows of no more than every device allows; at least `groups` of them.
-fn layout_of(groups: u32) -> [u32; 2] {
-    let rows = groups.div_ceil(65_535);
-    [groups.div_ceil(rows), rows]
+/// Workgroups of each of so many pieces, in rows of no more than every device allows; at least `groups` of all of them.
+fn layout_of(groups: u32, pieces: u32) -> [u32; 2] {
+    let rows = groups.div_ceil(65_535 * pieces);
+    [groups.div_ceil(rows * pieces), rows]
 }

@@ -89,7 +89,8 @@ impl Pipelines {
             .name(c"main")
             .specialization_info(&specialization);
         let create = vk::ComputePipelineCreateInfo::default()
-            .flags(self.flags)
+            // Long launches are divided by their workgroups.
+            .flags(self.flags | vk::PipelineCreateFlags::DISPATCH_BASE)
             .stage(stage_info)
             .layout(layouts.pipeline);
         // SAFETY: module and layout are alive; the context outlives the pipeline.

@@ -13,18 +13,26 @@ use super::device::Device;
 use crate::error::{Error, Result};
 use crate::stage::BufferId;
 
+/// A launch of a slot's work.
+pub(super) struct SlotLaunch {
+    pub stage: &'static str,
+    pub threads: u32,
+    /// Into which it is divided, each with two timestamps.
+    pub pieces: u32,
+}
+
 /// One piece of work that is in flight, or what a former one has left for the next.
 pub(super) struct Slot {
     /// As many as the work was ever parted into.
     commands: Vec<vk::CommandBuffer>,
     fence: vk::Fence,
     pub queries: vk::QueryPool,
-    query_count: u32,
+    query_room: u32,
     pub read_back: HashMap<BufferId, Buffer>,
     /// Bytes that are read back of each buffer.
     pub reads: Vec<(BufferId, u64)>,
-    /// The launches in order: stage and invocations.
-    pub launches: Vec<(&'static str, u32)>,
+    /// The launches in order.
+    pub launches: Vec<SlotLaunch>,
     pub submitted: Instant,
     is_busy: bool,
 }
@@ -37,7 +45,7 @@ impl Slot {
             commands: Vec::new(),
             fence: fence.or_vulkan("vkCreateFence")?,
             queries: vk::QueryPool::null(),
-            query_count: 0,
+            query_room: 0,
             read_back: HashMap::new(),
             reads: Vec::new(),
             launches: Vec::new(),
@@ -46,9 +54,14 @@ impl Slot {
         })
     }
 
+    /// Timestamps of the launches.
+    pub fn query_count(&self) -> u32 {
+        2 * self.launches.iter().map(|launch| launch.pieces).sum::<u32>()
+    }
+
     /// Room for so many timestamps.
     pub fn make_queries(&mut self, context: &Context, count: u32) -> Result<()> {
-        if count <= self.query_count {
+        if count <= self.query_room {
             return Ok(());
         }
         let create = vk::QueryPoolCreateInfo::default()
@@ -58,13 +71,13 @@ impl Slot {
         unsafe {
             context.device.destroy_query_pool(self.queries, None);
             self.queries = vk::QueryPool::null();
-            self.query_count = 0;
+            self.query_room = 0;
             self.queries = context
                 .device
                 .create_query_pool(&create, None)
                 .or_vulkan("vkCreateQueryPool")?;
         }
-        self.query_count = count;
+        self.query_room = count;
         Ok(())
     }
 
