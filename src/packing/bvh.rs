@@ -38,7 +38,7 @@ pub struct Bvh {
 }
 
 /// Shared triangles, put somewhere.
-pub struct Instance {
+pub struct PlacedMesh {
     /// Which shared triangles.
     pub shared: usize,
     /// Where.
@@ -49,7 +49,7 @@ pub struct Instance {
 ///
 /// # Errors
 /// A text, if there are too many triangles.
-pub fn build(scene: &Scene, shared: &[Range<u32>], instances: &[Instance]) -> Result<Bvh, String> {
+pub fn build(scene: &Scene, shared: &[Range<u32>], instances: &[PlacedMesh]) -> Result<Bvh, String> {
     let own: Vec<u32> = scene.own_triangles().collect();
     let all = own.len() + shared.iter().map(Range::len).sum::<usize>();
     let items = all + instances.len();
@@ -76,7 +76,7 @@ pub fn build(scene: &Scene, shared: &[Range<u32>], instances: &[Instance]) -> Re
         bvh.shared.push(first..bvh.order.len() as u32);
         roots.push(root as u32);
     }
-    let placed = instances.par_iter().map(|Instance { shared, placement }| Placed {
+    let placed = instances.par_iter().map(|PlacedMesh { shared, placement }| Placed {
         root: roots[*shared],
         placement: *placement,
         bounds: bounds(

@@ -241,7 +241,7 @@ struct SharedTriangles {
     ranges: Vec<Range<u32>>,
     materials: Vec<u32>,
     /// In the order of the objects.
-    placed: Vec<bvh::Instance>,
+    placed: Vec<bvh::PlacedMesh>,
 }
 
 fn shared_triangles(scene: &Scene) -> SharedTriangles {
@@ -258,16 +258,16 @@ fn shared_triangles(scene: &Scene) -> SharedTriangles {
             found.materials.push(object.material);
             found.ranges.len() - 1
         });
-        found.placed.push(bvh::Instance { shared, placement });
+        found.placed.push(bvh::PlacedMesh { shared, placement });
     }
     found
 }
 
-fn instances(scene: &Scene, placed: &[bvh::Instance], shared: &[Range<u32>], ranks: &[u32]) -> Vec<Instance> {
+fn instances(scene: &Scene, placed: &[bvh::PlacedMesh], shared: &[Range<u32>], ranks: &[u32]) -> Vec<Instance> {
     let objects = (0..)
         .zip(&scene.objects)
         .filter(|(_, object)| object.placement.is_some());
-    let instance = |((object, _), placed): ((u32, _), &bvh::Instance)| {
+    let instance = |((object, _), placed): ((u32, _), &bvh::PlacedMesh)| {
         let triangles = &shared[placed.shared];
         Instance {
             rows: placed.placement.rows,

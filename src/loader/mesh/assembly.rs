@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 use super::builder::Builder;
 use super::geometry::Geometry;
-use super::instance::Instance;
+use super::mesh_instance::MeshInstance;
 use super::primitive::Primitive;
 use super::skin::Skins;
 use super::{instancing, morph, sharing};
@@ -30,7 +30,7 @@ pub(crate) fn instances<'a>(
     nodes: &'a [PlacedNode<'a>],
     pose: &Pose<'_>,
     warnings: &mut Warnings,
-) -> Check<Vec<Instance<'a>>> {
+) -> Check<Vec<MeshInstance<'a>>> {
     let mut instances = Vec::new();
     let mut opened: HashMap<(usize, usize), Option<Rc<Primitive<'a>>>> = HashMap::new();
     let mut skins = Skins::new(document, nodes);
@@ -108,7 +108,7 @@ pub(crate) fn instances<'a>(
                 ));
             }
             instances.extend(places.iter().map(|&to_world| {
-                Instance::new(
+                MeshInstance::new(
                     placed,
                     to_world,
                     mesh_index,
@@ -124,7 +124,11 @@ pub(crate) fn instances<'a>(
 }
 
 /// Builds the triangles of all instances in render space, without those that have no area.
-pub(crate) fn assemble(document: &Document, instances: &[Instance<'_>], warnings: &mut Warnings) -> Check<Geometry> {
+pub(crate) fn assemble(
+    document: &Document,
+    instances: &[MeshInstance<'_>],
+    warnings: &mut Warnings,
+) -> Check<Geometry> {
     let root = &document.root;
     let normalisation = normalise(root, instances)?;
     let mut builder = Builder::new(normalisation, sharing::is_worth_it(root, instances));

@@ -8,9 +8,9 @@ use gltf::json::Root;
 use super::attributes::NotFinite;
 use super::facet::{face_normal, spans_area};
 use super::geometry::Geometry;
-use super::instance::{Instance, WorldTriangle};
+use super::mesh_instance::{MeshInstance, WorldTriangle};
 use super::normalisation::normalise;
-use super::primitive::Corner;
+use super::primitive::FaceCorner;
 use super::sharing::{placed, shareable, stays_whole};
 use crate::loader::diagnostic::Check;
 use crate::scene::{Normalisation, Object, Placement, SHARED, Triangle};
@@ -81,7 +81,7 @@ impl Builder {
     }
 
     /// Bytes of what there is, and of an instance beside it at the least.
-    pub(crate) fn bytes_with(&self, instance: &Instance<'_>) -> u64 {
+    pub(crate) fn bytes_with(&self, instance: &MeshInstance<'_>) -> u64 {
         let more = if self.shared.contains_key(&instance.key()) {
             0
         } else {
@@ -93,7 +93,7 @@ impl Builder {
     }
 
     /// Adds an instance as an object, unless nothing of it is left. Returns how many triangles were dropped.
-    pub(crate) fn add(&mut self, root: &Root, instance: &Instance<'_>) -> Check<usize> {
+    pub(crate) fn add(&mut self, root: &Root, instance: &MeshInstance<'_>) -> Check<usize> {
         let object = |triangles, placement| Object {
             name: instance.name(root),
             material: instance.primitive.material as u32,
@@ -125,7 +125,7 @@ impl Builder {
     /// Puts the shared triangles of an instance's primitive where its node has them; `None` where it has to have triangles of
     /// its own: those that emit are lights, skins and morph targets give every node other ones, and of what is nearly flat or
     /// hardly there rounding would leave nothing.
-    fn share(&mut self, root: &Root, instance: &Instance<'_>) -> Check<Option<Placed>> {
+    fn share(&mut self, root: &Root, instance: &MeshInstance<'_>) -> Check<Option<Placed>> {
         let Some(to_world) = shareable(root, instance).filter(|_| self.shares) else {
             return Ok(None);
         };
@@ -161,7 +161,12 @@ impl Builder {
     }
 
     /// Adds the triangles of an object in a space. Returns how many were dropped.
-    pub(crate) fn add_triangles(&mut self, instance: &Instance<'_>, space: Normalisation, object: u32) -> Check<usize> {
+    pub(crate) fn add_triangles(
+        &mut self,
+        instance: &MeshInstance<'_>,
+        space: Normalisation,
+        object: u32,
+    ) -> Check<usize> {
         let primitive = &instance.primitive;
         let mut dropped = 0;
         if self.scene_vertices.len() < primitive.attributes.len() {
@@ -204,7 +209,13 @@ impl Builder {
     }
 
     /// The scene's vertex for a vertex of the primitive in hand. The first triangle that uses it adds it.
-    fn vertex(&mut self, instance: &Instance<'_>, corner: Corner, position: Vec3, face_normal: DVec3) -> Check<u32> {
+    fn vertex(
+        &mut self,
+        instance: &MeshInstance<'_>,
+        corner: FaceCorner,
+        position: Vec3,
+        face_normal: DVec3,
+    ) -> Check<u32> {
         let vertex = corner.vertex;
         let known = self.scene_vertices[vertex];
         if known != UNSEEN && !instance.primitive.splits_vertices() {

@@ -7,12 +7,12 @@ use glam::DVec3;
 use gltf::json::Root;
 
 use super::facet::face_normal;
-use super::instance::Instance;
+use super::mesh_instance::MeshInstance;
 use crate::loader::diagnostic::Check;
 use crate::scene::Normalisation;
 
 /// Finds render space from the bounds of all triangles that have an area.
-pub(crate) fn normalise(root: &Root, instances: &[Instance<'_>]) -> Check<Normalisation> {
+pub(crate) fn normalise(root: &Root, instances: &[MeshInstance<'_>]) -> Check<Normalisation> {
     let mut lower = DVec3::INFINITY;
     let mut upper = DVec3::NEG_INFINITY;
     let mut repeated = HashMap::new();

@@ -26,7 +26,7 @@ pub(crate) struct Primitive<'a> {
 
 /// A corner of a triangle of the primitive.
 #[derive(Clone, Copy)]
-pub(crate) struct Corner {
+pub(crate) struct FaceCorner {
     /// Index of the triangle.
     pub triangle: usize,
     /// Which of its corners it is in the file.
@@ -149,7 +149,7 @@ impl<'a> Primitive<'a> {
     }
 
     /// The tangent at a corner where the file has none, in the mesh's space.
-    pub(crate) fn generated_tangent(&self, corner: Corner) -> Option<Vec4> {
+    pub(crate) fn generated_tangent(&self, corner: FaceCorner) -> Option<Vec4> {
         let tangents = self.generated_tangents.as_ref()?;
         Some(tangents[corner.triangle][corner.place])
     }

@@ -8,7 +8,7 @@ use gltf::json::Root;
 
 use super::facet::spans_area;
 use super::geometry::Geometry;
-use super::instance::Instance;
+use super::mesh_instance::MeshInstance;
 use crate::scene::{Normalisation, Placement};
 
 /// Triangles of a primitive that is worth sharing. Fewer hardly take memory, and walls made of equal parts stay watertight
@@ -19,14 +19,14 @@ const FEWEST: usize = 32;
 const ONE_SAVED_IN: usize = 4;
 
 /// Where an instance is whose triangles others may share.
-pub(crate) fn shareable(root: &Root, instance: &Instance<'_>) -> Option<DAffine3> {
+pub(crate) fn shareable(root: &Root, instance: &MeshInstance<'_>) -> Option<DAffine3> {
     let primitive = &instance.primitive;
     let may_be = instance.is_repeated() && primitive.triangle_count() >= FEWEST && !emits(root, primitive.material);
     instance.node_alone().filter(|_| may_be)
 }
 
 /// Whether the instances have so many triangles in common that sharing them is worth its price.
-pub(crate) fn is_worth_it(root: &Root, instances: &[Instance<'_>]) -> bool {
+pub(crate) fn is_worth_it(root: &Root, instances: &[MeshInstance<'_>]) -> bool {
     let (mut all, mut saved) = (0, 0);
     let mut known = HashSet::new();
     for instance in instances {

@@ -1,6 +1,6 @@
 //! A primitive as one node shows it: morphed, then taken to world space by the node or by the joints of its skin.
 
-use super::primitive::Corner;
+use super::primitive::FaceCorner;
 use std::rc::Rc;
 
 use glam::{DAffine3, DMat3, DVec3, DVec4, Vec4};
@@ -16,7 +16,7 @@ use crate::text::shorten;
 
 /// A primitive, and where a node puts it.
 #[derive(Clone)]
-pub(crate) struct Instance<'a> {
+pub(crate) struct MeshInstance<'a> {
     node: &'a PlacedNode<'a>,
     mesh: usize,
     primitive_index: usize,
@@ -24,13 +24,13 @@ pub(crate) struct Instance<'a> {
     pub primitive: Rc<Primitive<'a>>,
     /// Morph targets with the weights that aren't zero.
     morph: Vec<(usize, f64)>,
-    placement: Placement,
+    deformation: Deformation,
 }
 
 #[derive(Clone)]
-enum Placement {
-    Node(Map),
-    Skin(JointMatrices),
+enum Deformation {
+    Rigid(Map),
+    Skinned(JointMatrices),
 }
 
 /// From the mesh's space to world space.
@@ -56,12 +56,12 @@ impl Map {
 /// A triangle in world space, counter-clockwise from the front.
 pub(crate) struct WorldTriangle {
     /// Its corners.
-    pub corners: [Corner; 3],
+    pub corners: [FaceCorner; 3],
     /// Their positions.
     pub positions: [DVec3; 3],
 }
 
-impl<'a> Instance<'a> {
+impl<'a> MeshInstance<'a> {
     /// The primitive as `node` shows it at a place in the world, or else by the skin's matrices if the node has a skin.
     pub(crate) fn new(
         node: &'a PlacedNode<'a>,
@@ -72,9 +72,9 @@ impl<'a> Instance<'a> {
         morph: Vec<(usize, f64)>,
         skin: Option<JointMatrices>,
     ) -> Self {
-        let placement = match skin {
-            Some(matrices) if primitive.attributes.is_skinned() => Placement::Skin(matrices),
-            _ => Placement::Node(Map::new(to_world)),
+        let deformation = match skin {
+            Some(matrices) if primitive.attributes.is_skinned() => Deformation::Skinned(matrices),
+            _ => Deformation::Rigid(Map::new(to_world)),
         };
         Self {
             node,
@@ -82,7 +82,7 @@ impl<'a> Instance<'a> {
             primitive_index,
             primitive,
             morph,
-            placement,
+            deformation,
         }
     }
 
@@ -103,8 +103,8 @@ impl<'a> Instance<'a> {
 
     /// Where it is in the world if only its node puts it there: no skin and no morph target.
     pub(crate) fn node_alone(&self) -> Option<DAffine3> {
-        match &self.placement {
-            Placement::Node(map) if self.morph.is_empty() => Some(map.to_world),
+        match &self.deformation {
+            Deformation::Rigid(map) if self.morph.is_empty() => Some(map.to_world),
             _ => None,
         }
     }
@@ -112,7 +112,7 @@ impl<'a> Instance<'a> {
     /// The same in the mesh's space.
     pub(crate) fn unplaced(&self) -> Self {
         Self {
-            placement: Placement::Node(Map::new(DAffine3::IDENTITY)),
+            deformation: Deformation::Rigid(Map::new(DAffine3::IDENTITY)),
             ..self.clone()
         }
     }
@@ -134,14 +134,14 @@ impl<'a> Instance<'a> {
     /// A triangle in world space, checked to be finite.
     pub(crate) fn triangle(&self, triangle: usize) -> Check<WorldTriangle> {
         let vertices = self.primitive.triangle(triangle)?;
-        let mut corners = [0, 1, 2].map(|place| Corner {
+        let mut corners = [0, 1, 2].map(|place| FaceCorner {
             triangle,
             place,
             vertex: vertices[place],
         });
-        let is_mirrored = match &self.placement {
-            Placement::Node(map) => map.is_mirrored,
-            Placement::Skin(_) => self.map(vertices[0])?.is_mirrored,
+        let is_mirrored = match &self.deformation {
+            Deformation::Rigid(map) => map.is_mirrored,
+            Deformation::Skinned(_) => self.map(vertices[0])?.is_mirrored,
         };
         if is_mirrored {
             corners.swap(1, 2);
@@ -170,7 +170,7 @@ impl<'a> Instance<'a> {
 
     /// Unit tangent at a corner in world space and the sign of its bitangent, zero where it has no direction; `None`
     /// where there is none.
-    pub(crate) fn tangent(&self, corner: Corner) -> Check<Option<Result<Vec4, NotFinite>>> {
+    pub(crate) fn tangent(&self, corner: FaceCorner) -> Check<Option<Result<Vec4, NotFinite>>> {
         let tangent = match self.primitive.generated_tangent(corner) {
             Some(tangent) => Some(Ok(tangent.as_dvec4())),
             None => self.primitive.attributes.tangent(corner.vertex, &self.morph),
@@ -183,16 +183,16 @@ impl<'a> Instance<'a> {
     }
 
     fn map(&self, vertex: usize) -> Check<Map> {
-        match &self.placement {
-            Placement::Node(map) => Ok(*map),
-            Placement::Skin(_) => Ok(Map::new(self.to_world(vertex)?)),
+        match &self.deformation {
+            Deformation::Rigid(map) => Ok(*map),
+            Deformation::Skinned(_) => Ok(Map::new(self.to_world(vertex)?)),
         }
     }
 
     fn to_world(&self, vertex: usize) -> Check<DAffine3> {
-        match &self.placement {
-            Placement::Node(map) => Ok(map.to_world),
-            Placement::Skin(matrices) => self.blend(matrices, vertex),
+        match &self.deformation {
+            Deformation::Rigid(map) => Ok(map.to_world),
+            Deformation::Skinned(matrices) => self.blend(matrices, vertex),
         }
     }
 
