@@ -95,7 +95,7 @@ fn compile(
     options.set_auto_bind_uniforms(true);
     options.set_warnings_as_errors();
     options.set_include_callback(|name, _, _, _| {
-        let path = root.join("glsl/shared").join(name);
+        let path = root.join("glsl").join(name);
         let content = match layout::include(name) {
             Some(generated) => generated,
             None => fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?,

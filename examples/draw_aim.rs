@@ -104,7 +104,7 @@ impl Starts<'_> {
     /// Panels of the plane across a directional light.
     fn across(&self, lights: &[Light], scale: f64) -> Vec<Panel> {
         let light = lights[0];
-        // The same as those of `glsl/shared/sampling.glsl`.
+        // The same as those of `glsl/common/sampling.glsl`.
         let (x, y) = Vec3::from(light.direction).as_dvec3().any_orthonormal_pair();
         let disc = |[a, b, c]: [f32; 3], radius: f64| {
             let point = DVec3::new(a.into(), b.into(), c.into());
@@ -160,7 +160,7 @@ fn panel(density: impl Fn(DVec2) -> f64) -> Panel {
         .collect()
 }
 
-/// The numbers for which `disc_point` of `glsl/shared/sampling.glsl` gives this point of the unit disc.
+/// The numbers for which `disc_point` of `glsl/common/sampling.glsl` gives this point of the unit disc.
 fn square_point(p: DVec2) -> DVec2 {
     let wide = p.x.abs() > p.y.abs();
     let q = if wide { p } else { p.yx() };

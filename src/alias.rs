@@ -1,5 +1,5 @@
 //! The alias method: Vose, «A Linear Algorithm For Generating Random Numbers With a Given Distribution», IEEE Transactions
-//! on Software Engineering 17(9), 1991. `glsl/shared/alias_table.glsl` chooses in the same way.
+//! on Software Engineering 17(9), 1991. `glsl/lights/alias_table.glsl` chooses in the same way.
 
 /// A cell of the table, which has as many as there are things to choose among.
 #[derive(Debug, Clone, Copy, PartialEq)]

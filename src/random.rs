@@ -1,4 +1,4 @@
-//! The numbers that `glsl/shared/random.glsl` draws, bit for bit. The host needs them too, to know where photon paths
+//! The numbers that `glsl/common/random.glsl` draws, bit for bit. The host needs them too, to know where photon paths
 //! started.
 
 mod sobol;

@@ -34,7 +34,7 @@ pub enum BufferId {
     LightSources,
     /// Names of the media that each light is in: see `packing/immersion.rs`.
     MediaOfLights,
-    /// What shines from afar, and how directions are chosen from it; see `glsl/shared/environment.glsl`.
+    /// What shines from afar, and how directions are chosen from it; see `glsl/lights/environment.glsl`.
     Environment,
     /// Where aimed photon paths start; see [`crate::emission::Table::texels`].
     EmissionTable,
@@ -66,7 +66,7 @@ pub enum BufferId {
     Footprints,
     /// R² that each slot gathers within in this iteration, f32, for each photon map.
     Radii2,
-    /// What visible points want of photons in each cell, f32; see `glsl/shared/demand.glsl`.
+    /// What visible points want of photons in each cell, f32; see `glsl/gather/demand.glsl`.
     Demand,
     /// [`crate::layout::ShellRadii`] of each photon map's shells.
     RadiiOfShells,

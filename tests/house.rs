@@ -165,6 +165,76 @@ fn imports_go_downward() {
     }
 }
 
+/// Files of a folder under glsl, each by its path there, without comments.
+fn glsl(folder: &str) -> Vec<(String, String)> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl").join(folder);
+    let files = fs::read_dir(&path).expect("folder").map(|entry| entry.expect("entry"));
+    files
+        .map(|file| {
+            let text = fs::read_to_string(file.path()).expect("GLSL");
+            let lines: Vec<&str> = text.lines().map(|line| line.split("//").next().unwrap_or("")).collect();
+            (format!("{folder}/{}", file.file_name().display()), lines.join("\n"))
+        })
+        .collect()
+}
+
+#[test]
+fn kernels_know_no_lobe_and_no_kind_of_light() {
+    let words = [
+        "is_mirror",
+        "is_dielectric",
+        "is_glossy",
+        "is_matte",
+        "is_coated",
+        "is_mixed",
+        "is_thin",
+        "is_punctual",
+        "MIRRORS",
+        "DIELECTRICS",
+        "GLOSSY",
+        "CLEARCOAT",
+        "DISPERSION",
+        "THIN_WALLS",
+        "ROUGH_GLASS",
+        "PARTLY_CLEAR",
+        "PUNCTUAL_LIGHTS",
+        "SOFT_LIGHTS",
+        "ENVIRONMENT",
+        "ABSORPTION",
+        "NESTED",
+        "ALPHA",
+        "COINCIDENCE",
+        "CONTACT",
+        "_LIGHT)",
+        ".roughness",
+        ".metallic",
+        ".base_color",
+    ];
+    for (file, text) in glsl("stages").into_iter().chain(glsl("gather")) {
+        for word in words {
+            assert!(
+                !text.contains(word),
+                "glsl/{file} has «{word}»: it belongs behind the interface of glsl/bsdf, glsl/lights or glsl/trace"
+            );
+        }
+    }
+}
+
+/// Compilers inline functions. What a function with several returns gives, or a variable that some ways leave unset, is then carried
+/// through all iterations of the kernel's loop, in registers: 33 in `photons` before.
+#[test]
+fn functions_that_kernels_call_in_loops_return_once() {
+    for (file, text) in ["bsdf", "lights", "trace"].into_iter().flat_map(glsl) {
+        for function in text.split("\n}") {
+            let returns = function.matches("return ").count() + function.matches("return;").count();
+            let name = function
+                .lines()
+                .find(|line| line.ends_with(") {") || line.contains('('));
+            assert!(returns <= 1, "glsl/{file}: {returns} returns in {}", name.unwrap_or(""));
+        }
+    }
+}
+
 #[test]
 fn every_stage_is_documented_where_it_is_written() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl/stages");

@@ -4,26 +4,16 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "random.glsl"
-#include "texel.glsl"
-#include "scene.glsl"
-#include "intersect.glsl"
-#include "texture.glsl"
-#include "alpha.glsl"
-#include "bsdf.glsl"
-#include "dispersion.glsl"
-#include "media.glsl"
-#include "contact.glsl"
-#include "encounter.glsl"
-#include "environment.glsl"
-#include "light.glsl"
-#include "glint.glsl"
-#include "visible_point.glsl"
-#include "status.glsl"
+#include "common/texel.glsl"
+#include "common/random.glsl"
+#include "trace/interaction.glsl"
+#include "bsdf/bsdf.glsl"
+#include "lights/environment.glsl"
+#include "lights/delta_lights.glsl"
+#include "gather/visible_point.glsl"
+#include "common/status.glsl"
 
 // Visible points a pixel: above 1, glass splits the path for as long as a slot is free (the paper's estimator, whose
 // visible points are found once and have to hold both branches).
@@ -55,59 +45,25 @@ struct Branch {
     bool lamps_seen;      // what lights with an extent send along the ray
 };
 
-// What a ray sees that meets no surface.
-vec3 radiance_from_afar(vec3 direction) {
-    if (ENVIRONMENT) {
-        return environment_at(direction).radiance;
-    }
-    return vec3(0.0);
-}
-
 // Lengths of a ray's direction up to what it met.
 float way_of(Hit hit) {
     return hit.triangle == MISS ? 1e30 : hit.t;
 }
 
 // What passes a boundary waits while the path looks at what the boundary reflects, before it chooses which of both to follow: a
-// lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck. It waits in shared memory, a place for
-// each invocation, since registers are scarce where rays are traced.
-shared vec3 passing_origin[64];
-shared vec3 passing_direction[64];
-shared vec3 passing_throughput[64];
-shared uint passing_medium[64];
-shared uvec3 passing_other_media[64]; // NESTED
-
+// lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
 void let_wait(vec3 origin, vec3 direction, vec3 throughput, Media media) {
-    uint place = gl_LocalInvocationIndex;
-    passing_origin[place] = origin;
-    passing_direction[place] = direction;
-    passing_throughput[place] = throughput;
-    passing_medium[place] = media.first;
-    if (NESTED) {
-        passing_other_media[place] = media.others;
-    }
+    keep(FIRST_KEPT_BY_KERNEL, origin);
+    keep(FIRST_KEPT_BY_KERNEL + 3u, direction);
+    keep(FIRST_KEPT_BY_KERNEL + 6u, throughput);
+    keep_media(FIRST_KEPT_BY_KERNEL + 9u, media);
 }
 
 void take_what_waits(inout Branch branch) {
-    uint place = gl_LocalInvocationIndex;
-    branch.origin = passing_origin[place];
-    branch.direction = passing_direction[place];
-    branch.throughput = passing_throughput[place];
-    branch.media.first = passing_medium[place];
-    if (NESTED) {
-        branch.media.others = passing_other_media[place];
-    }
-}
-
-// Follows what a boundary of microfacets reflects, or none of it where that would fly into the surface.
-void reflect_branch(inout Branch branch, Reflector reflector, Facing facing, vec2 u) {
-    vec3 viewer = -branch.direction;
-    branch.direction = reflector.alpha < SMOOTH_ALPHA
-                           ? mirror_direction(facing, branch.direction)
-                           : reflected_direction(reflector.alpha, facing.shading_normal, viewer, u);
-    branch.throughput *= dot(branch.direction, facing.geometric_normal) > 0.0
-                             ? reflected_weight(reflector, facing.shading_normal, viewer, branch.direction)
-                             : vec3(0.0);
+    branch.origin = kept(FIRST_KEPT_BY_KERNEL);
+    branch.direction = kept(FIRST_KEPT_BY_KERNEL + 3u);
+    branch.throughput = kept(FIRST_KEPT_BY_KERNEL + 6u);
+    branch.media = kept_media(FIRST_KEPT_BY_KERNEL + 9u);
 }
 
 void main() {
@@ -148,10 +104,7 @@ void main() {
     branch.way = 0.0;
     branch.depth = 0u;
     branch.ignored = NO_TRIANGLE;
-    branch.media = IN_VACUUM;
-    if (IMMERSED) {
-        branch.media = Media(settings.camera_media.x, settings.camera_media.yzw);
-    }
+    branch.media = media_from(settings.camera_media);
     branch.wavelength = 0.0;
     branch.reflection_seen = false;
     branch.lamps_seen = false;
@@ -175,44 +128,41 @@ void main() {
         PlacedTriangle ignored = PlacedTriangle(asks ? MISS : branch.ignored.triangle, branch.ignored.instance);
         Hit hit = trace_visible(origin, direction, progress, asks ? light_ray.end : 1e30, ignored, asks, random);
         bool missed = hit.triangle == MISS;
+        vec3 from_light = missed ? light_ray.contribution : vec3(0.0);
+        light_ray = NO_LIGHT_RAY;
         if (loops_cut) {
             cut = true;
             ended = true;
-            light_ray = NO_LIGHT_RAY;
         } else if (asks) {
-            branch.emitted += missed ? light_ray.contribution : vec3(0.0);
-            light_ray = NO_LIGHT_RAY;
+            branch.emitted += from_light;
         } else {
-            bool culls = CULLING && branch.depth == 0u;
-            vec3 seen = vec3(0.0); // radiance along the ray
-            bool dark = missed;    // nothing is there that scatters light
-            if (SOFT_LIGHTS && !branch.lamps_seen) {
+            bool culls = branch.depth == 0u;
+            bool dark = missed;       // nothing is there that scatters light
+            bool passes_back = false; // of a surface that no camera sees from there
+            vec3 passed = vec3(1.0); // of what comes along the ray
+            if (!branch.lamps_seen) {
                 vec3 from = branch.origin + progress.t * branch.direction;
-                seen = soft_lights_along(from, branch.direction, way_of(hit) - progress.t, branch.media.first);
+                branch.emitted += branch.throughput * soft_lights_along(from, branch.direction, way_of(hit) - progress.t,
+                                                                        branch.media.first);
             }
-            Encounter met;
-            vec3 kept = vec3(1.0); // of what comes along the ray
+            SurfaceInteraction met = no_interaction();
             if (missed) {
-                seen += radiance_from_afar(branch.direction);
+                branch.emitted += branch.throughput * radiance_from_afar(branch.direction);
             } else {
-                met = encounter(hit, branch.direction, branch.media, culls, random);
-                if (CULLING && culls && is_hidden_back(met.surface, met.material, branch.direction)) {
-                    branch.emitted += branch.throughput * seen;
-                    progress = past(hit);
-                    continue;
+                met = interact(hit, branch.direction, branch.media, culls, random);
+                passes_back = culls && is_hidden_back(met.surface, met.material, branch.direction);
+                passed = transmittance(met.through.first, hit.t);
+                if (!met.hidden && !passes_back && emits(met.material, met.frame.front)) {
+                    float cosine = -dot(branch.direction, met.frame.geometric_normal);
+                    branch.emitted += branch.throughput * passed * emitted_radiance(met.material, cosine);
                 }
-                if (ABSORPTION) {
-                    kept = transmittance(met.through.first, hit.t);
-                }
-                if (!met.hidden && emits(met.material, met.facing.front)) {
-                    seen += kept * emitted_radiance(met.material, -dot(branch.direction, met.facing.geometric_normal));
-                }
-                dark = is_matte(met.material) && largest(met.material.base_color) == 0.0;
+                dark = is_black(met.material);
             }
+            bool goes_on = !passes_back;
             progress = AT_ORIGIN;
-            bool goes_on = true;
-            branch.emitted += branch.throughput * seen;
-            if (DIELECTRICS && waits != 0.0) {
+            if (passes_back) {
+                progress = past(hit);
+            } else if (waits != 0.0) {
                 bool passes = dark || waits < 0.0;
                 float reflectance = abs(waits);
                 waits = 0.0;
@@ -228,126 +178,91 @@ void main() {
                 ended = true;
             } else if (goes_on) {
                 branch.way += hit.t;
-                branch.throughput *= kept;
+                branch.throughput *= passed;
                 branch.ignored = met.surface.triangle;
                 branch.lamps_seen = false;
-                if (NESTED && met.hidden) {
+                if (met.hidden) {
                     branch.throughput *= met.tint;
                     branch.media = met.beyond;
-                    branch.origin = origin_towards(met.surface, branch.direction);
-                    continue;
-                }
-                met_surface = true;
-                Material material = met.material;
-                if (is_mixed(material)) {
-                    u = next4(random);
-                    choose_part(material, u.x);
-                }
-                if (is_coated(material)) {
-                    u = next4(random);
-                    branch.throughput *= choose_layer(material, met.facing, met.surface, branch.direction, u.x);
-                }
-                // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
-                Reflector reflector = NO_REFLECTOR;
-                reflector.diffuse = material.base_color;
-                if (is_glossy(material)) {
-                    reflector = reflector_of(material);
-                }
-                vec3 viewer = -branch.direction;
-                bool stops = is_matte(material) || (is_glossy(material) && reflector.alpha >= FOLLOWED_ALPHA);
-                ended = true;
-                if (!stops && branch.depth + 1u >= settings.max_depth) {
-                    atomicAdd(status.truncated_paths, 1u);
-                } else if (!stops) {
-                    branch.depth += 1u;
-                    u = next4(random);
-                    bool rough = is_dielectric(material) ? is_rough_glass(material) : reflector.alpha >= SMOOTH_ALPHA;
-                    if (PUNCTUAL_LIGHTS && rough) {
-                        branch.lamps_seen = true;
-                        if (many) {
-                            branch.emitted += branch.throughput * glint_of_all(met, material, reflector, viewer, random);
-                        } else {
-                            light_ray = glint_of_one(met, material, reflector, viewer, random);
-                            light_ray.contribution *= branch.throughput;
+                } else {
+                    met_surface = true;
+                    vec3 incoming = branch.direction;
+                    branch.throughput *= choose_lobe(met, incoming, random);
+                    bool follows = is_followed(met.material);
+                    bool stops = !follows;
+                    ended = true;
+                    if (follows && branch.depth + 1u >= settings.max_depth) {
+                        atomicAdd(status.truncated_paths, 1u);
+                    } else if (follows) {
+                        branch.depth += 1u;
+                        u = next4(random);
+                        if (shows_delta_lights(met.material)) {
+                            branch.lamps_seen = true;
+                            if (many) {
+                                branch.emitted += branch.throughput * all_delta_lights(met, -incoming, random);
+                            } else {
+                                light_ray = sample_delta_light(met, -incoming, random);
+                                light_ray.contribution *= branch.throughput;
+                            }
                         }
-                    }
-                    if (is_mirror(material)) {
-                        float cosine = dot(viewer, met.facing.shading_normal);
-                        branch.throughput *= fresnel_schlick(material.base_color, cosine);
-                        if (is_coated(material)) {
-                            branch.throughput *= coat_passes(material.coat, cosine);
-                        }
-                        branch.direction = mirror_direction(met.facing, branch.direction);
-                    } else if (is_glossy(material)) {
-                        Branch reflected = branch;
-                        float p = reflection_probability(reflector, dot(viewer, met.facing.shading_normal));
-                        reflect_branch(reflected, reflector, met.facing, u.yz);
-                        if (many && p > 0.0 && p < 1.0 && used + pending_count + 1u < SLOTS) {
-                            reflected.emitted = vec3(0.0);
-                            reflected.origin = origin_towards(met.surface, reflected.direction);
-                            pending[pending_count] = reflected;
-                            pending_count += 1u;
-                            stops = true;
-                        } else if (u.x < p) {
-                            branch = reflected;
-                            branch.throughput *= 1.0 / p;
-                        } else {
-                            branch.throughput *= 1.0 / (1.0 - p);
-                            stops = true;
-                        }
-                        reflector.alpha = 0.0;
-                    } else if (DIELECTRICS) {
-                        if (DISPERSION) {
-                            branch.throughput *= disperse(material, branch.wavelength, random);
-                        }
-                        Boundary boundary = meet_boundary(met.facing, branch.direction, material, met.outside, u.yz);
-                        // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
-                        vec3 transmission = met.tint * (boundary.eta * boundary.eta * boundary.refracted_weight);
-                        bool splits = many && used + pending_count + 1u < SLOTS && boundary.reflectance < 1.0;
-                        bool uncertain = boundary.reflectance > 0.0 && boundary.reflectance < 1.0;
-                        bool peeks = !splits && !branch.reflection_seen && uncertain;
-                        bool reflects = !splits && (peeks || u.x < boundary.reflectance);
+                        vec3 color;
+                        Branching ways = branch_bsdf(met, incoming, u.yz, branch.wavelength, random, color);
+                        branch.throughput *= color;
+                        float p = ways.reflectance;
+                        bool uncertain = p > 0.0 && p < 1.0;
+                        bool splits = many && uncertain && used + pending_count + 1u < SLOTS;
+                        bool peeks = ways.transmits && !splits && !branch.reflection_seen && uncertain;
+                        bool reflects = !splits && (peeks || u.x < p);
                         if (many && splits) {
                             Branch reflected = branch;
-                            reflected.direction = boundary.reflected;
-                            reflected.throughput *= boundary.reflectance * boundary.reflected_weight;
-                            reflected.media = met.through;
+                            reflected.direction = ways.reflected;
+                            reflected.throughput *= p * ways.reflected_weight;
+                            if (ways.transmits) {
+                                reflected.media = met.through;
+                            }
                             reflected.origin = origin_towards(met.surface, reflected.direction);
                             reflected.emitted = vec3(0.0);
                             pending[pending_count] = reflected;
                             pending_count += 1u;
-                            transmission *= 1.0 - boundary.reflectance;
+                            ways.transmitted_weight *= 1.0 - p;
                         }
                         if (peeks) {
-                            waits = u.x < boundary.reflectance ? boundary.reflectance : -boundary.reflectance;
-                            let_wait(origin_towards(met.surface, boundary.refracted), boundary.refracted,
-                                     branch.throughput * transmission, met.beyond);
+                            waits = u.x < p ? p : -p;
+                            let_wait(origin_towards(met.surface, ways.transmitted), ways.transmitted,
+                                     branch.throughput * ways.transmitted_weight, met.beyond);
                             branch.reflection_seen = true;
-                            branch.throughput *= boundary.reflectance;
+                            branch.throughput *= p;
                         }
-                        branch.throughput *= reflects ? boundary.reflected_weight : transmission;
-                        branch.direction = reflects ? boundary.reflected : boundary.refracted;
-                        branch.media = met.beyond;
-                        if (reflects) {
+                        branch.throughput *= reflects ? ways.reflected_weight : ways.transmitted_weight;
+                        branch.direction = reflects ? ways.reflected : ways.transmitted;
+                        if (ways.transmits) {
                             branch.media = met.through;
+                            if (!reflects) {
+                                branch.media = met.beyond;
+                            }
                         }
+                        stops = !reflects && !ways.transmits;
+                        ended = stops || (largest(branch.throughput) <= 0.0 && waits == 0.0);
                     }
-                    ended = stops || (largest(branch.throughput) <= 0.0 && waits == 0.0);
-                    branch.origin = origin_towards(met.surface, branch.direction);
-                }
-                if (stops && (largest(reflector.diffuse) > 0.0 || reflector.alpha > 0.0)) {
-                    vec3 weight = branch.throughput;
-                    if (GLOSSY) {
-                        gloss_of_slots[slot] = gloss_of(reflector, viewer, has_coat(met.surface.material));
-                    } else {
-                        weight *= reflector.diffuse / PI;
+                    // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
+                    Bsdf bsdf = bsdf_of(met.material);
+                    if (follows) {
+                        bsdf = base_of(bsdf);
                     }
-                    found = true;
-                    visible_points[slot].position_object = vec4(met.surface.position, uintBitsToFloat(met.surface.object));
-                    visible_points[slot].weight_normal =
-                        vec4(weight, uintBitsToFloat(encode_direction(met.facing.geometric_normal)));
-                    visible_points[slot].emitted_normal.w = uintBitsToFloat(encode_direction(met.facing.shading_normal));
+                    if (stops && scatters(bsdf)) {
+                        if (carries_bsdf()) {
+                            gloss_of_slots[slot] = pack_bsdf(bsdf, -incoming, has_coat(met.surface.material));
+                        }
+                        found = true;
+                        visible_points[slot].position_object =
+                            vec4(met.surface.position, uintBitsToFloat(met.surface.object));
+                        visible_points[slot].weight_normal =
+                            vec4(branch.throughput * weight_of(bsdf),
+                                 uintBitsToFloat(encode_direction(met.frame.geometric_normal)));
+                        visible_points[slot].emitted_normal.w = uintBitsToFloat(encode_direction(met.frame.shading_normal));
+                    }
                 }
+                branch.origin = origin_towards(met.surface, branch.direction);
             }
         }
         if (ended && !asks_light(light_ray)) {

@@ -4,11 +4,11 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
-#include "visible_point.glsl"
-#include "clusters.glsl"
+#include "common/texel.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/clusters.glsl"
 
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer Centroids;

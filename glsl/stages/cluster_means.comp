@@ -4,10 +4,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "visible_point.glsl"
-#include "clusters.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/clusters.glsl"
 
 uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };

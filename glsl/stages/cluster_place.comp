@@ -4,8 +4,8 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
-#include "clusters.glsl"
+#include "common/invocation.glsl"
+#include "gather/clusters.glsl"
 
 layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };
 layout(std430) readonly buffer ClusterOf { uint cluster_of[]; };

@@ -4,10 +4,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "photon.glsl"
-#include "status.glsl"
+#include "gather/photon.glsl"
+#include "common/status.glsl"
 
 uniform usamplerBuffer LanePhotons;
 layout(std430) readonly buffer LaneCounts { uint lane_counts[]; };

@@ -4,8 +4,8 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
-#include "texel.glsl"
+#include "common/invocation.glsl"
+#include "common/texel.glsl"
 
 uniform usamplerBuffer ProbeFrom;
 layout(std430) writeonly buffer ProbeTo { uvec4 probe_to[]; };

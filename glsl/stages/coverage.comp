@@ -7,19 +7,15 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "random.glsl"
-#include "texel.glsl"
-#include "scene.glsl"
-#include "intersect.glsl"
-#include "texture.glsl"
-#include "object_grid.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
-#include "status.glsl"
+#include "common/texel.glsl"
+#include "common/random.glsl"
+#include "trace/interaction.glsl"
+#include "trace/object_grid.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
+#include "common/status.glsl"
 
 layout(push_constant) uniform Push {
     uint iteration;
@@ -73,7 +69,7 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
             return true; // the surface bends up
         }
         // Light passes glass, and what isn't there everywhere.
-        if (!is_dielectric(material_at(surface.material)) && (surface.flags & SEE_THROUGH) == 0u) {
+        if (!lets_light_pass(surface)) {
             inside = !inside;
             entered = side_of(surface, along);
         }
@@ -87,12 +83,10 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     // Then down: it may bend, but it must be there, under glass that lies on it and other faces in its place too.
     vec3 down = -radius * n;
     Hit below = trace(origin + along, down, 1.0, NO_TRIANGLE, false);
-    if (COINCIDENCE) {
+    if (faces_coincide()) {
         for (uint i = 1u; i < COVERAGE_CROSSINGS && below.triangle != MISS && !loops_cut; i++) {
             Surface met = surface_at(below);
-            bool glass = CONTACT && is_dielectric(material_at(met.material));
-            bool lies_on = glass || (met.flags & (COINCIDENT | BACKED)) != 0u;
-            if (met.object == object || !lies_on) {
+            if (met.object == object || !may_lie_on_others(met)) {
                 break;
             }
             below = trace_from(origin + along, down, past(below), 1.0, NO_TRIANGLE, false);
@@ -102,7 +96,7 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
         return false;
     }
     Surface there = surface_at(below);
-    return there.object == object && share_there(there) > 0.0;
+    return there.object == object && opacity(below) > 0.0;
 }
 
 // Whether a ray meets something, past glass, that may scatter light or mirror it.
@@ -118,10 +112,8 @@ bool is_surrounded(VisiblePoint visible_point, vec2 u) {
             break;
         }
         Surface surface = surface_at(hit);
-        Material material = material_at(surface.material);
-        bool passes = is_dielectric(material) || (surface.flags & SEE_THROUGH) != 0u;
-        if (!passes) {
-            scatters = !(is_matte(material) && largest(material.base_color) == 0.0);
+        if (!lets_light_pass(surface)) {
+            scatters = !is_black(material_at(surface.material));
             break;
         }
         origin = origin_towards(surface, direction);

@@ -6,13 +6,13 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "sampling.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
-#include "grid.glsl"
-#include "demand.glsl"
+#include "common/sampling.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
+#include "gather/grid.glsl"
+#include "gather/demand.glsl"
 
 layout(push_constant) uniform Push {
     uint iterations; // done so far

@@ -4,21 +4,13 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "random.glsl"
-#include "texel.glsl"
-#include "scene.glsl"
-#include "texture.glsl"
-#include "bsdf.glsl"
-#include "media.glsl"
-#include "environment.glsl"
-#include "light.glsl"
-#include "emission.glsl"
-#include "path_start.glsl"
-#include "status.glsl"
+#include "common/texel.glsl"
+#include "common/random.glsl"
+#include "lights/emission.glsl"
+#include "common/path_start.glsl"
+#include "common/status.glsl"
 
 layout(std430) writeonly buffer PathStarts { PathStart path_starts[]; };
 

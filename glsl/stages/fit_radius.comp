@@ -5,10 +5,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
 
 layout(push_constant) uniform Push {
     vec2 wanted; // photons of each map

@@ -5,18 +5,17 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "photon.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
-#include "gather.glsl"
-#include "point_groups.glsl"
-#include "object_grid.glsl"
-#include "status.glsl"
+#include "common/texel.glsl"
+#include "common/sampling.glsl"
+#include "gather/photon.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
+#include "gather/gather.glsl"
+#include "gather/point_groups.glsl"
+#include "trace/object_grid.glsl"
+#include "common/status.glsl"
 
 // The part of the sorted photons that this launch looks at.
 layout(push_constant) uniform Push {
@@ -37,7 +36,7 @@ void main() {
     uint me = gl_LocalInvocationID.x;
     uint group = group_of_workgroup(push.groups, push.factor);
     uint slot = group == NO_SLOT ? NO_SLOT : point_order[group * gl_WorkGroupSize.x + me];
-    Receiver receiver = NO_RECEIVER;
+    Receiver receiver = no_receiver();
     if (slot != NO_SLOT) {
         receiver = receiver_at(slot, push.map);
     }

@@ -6,17 +6,16 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "photon.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
-#include "gather.glsl"
-#include "grid.glsl"
-#include "status.glsl"
+#include "common/texel.glsl"
+#include "common/sampling.glsl"
+#include "gather/photon.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
+#include "gather/gather.glsl"
+#include "gather/grid.glsl"
+#include "common/status.glsl"
 
 // Visible points: 4×2 pixels, see pixel_of. Processors load a photon once for all; on GPUs, whose caches do that, more than one
 // takes the registers that hide memory's latency.

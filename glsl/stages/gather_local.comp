@@ -4,17 +4,16 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "photon.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
-#include "gather.glsl"
-#include "point_groups.glsl"
-#include "exhaustive.glsl"
+#include "common/texel.glsl"
+#include "common/sampling.glsl"
+#include "gather/photon.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
+#include "gather/gather.glsl"
+#include "gather/point_groups.glsl"
+#include "gather/exhaustive.glsl"
 
 uniform usamplerBuffer GatheredFrom;
 
@@ -24,7 +23,7 @@ shared uint receivers; // visible points of the workgroup
 void main() {
     uint me = gl_LocalInvocationID.x;
     uint slot = slot_at(me);
-    Receiver receiver = NO_RECEIVER;
+    Receiver receiver = no_receiver();
     if (slot != NO_SLOT) {
         receiver = receiver_at(slot, push.map);
     }

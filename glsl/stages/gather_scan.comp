@@ -5,17 +5,16 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "photon.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
-#include "gather.glsl"
-#include "point_groups.glsl"
-#include "exhaustive.glsl"
+#include "common/texel.glsl"
+#include "common/sampling.glsl"
+#include "gather/photon.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
+#include "gather/gather.glsl"
+#include "gather/point_groups.glsl"
+#include "gather/exhaustive.glsl"
 
 uniform usamplerBuffer GatheredFrom;
 

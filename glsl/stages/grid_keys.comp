@@ -4,10 +4,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "photon.glsl"
-#include "grid.glsl"
+#include "gather/photon.glsl"
+#include "gather/grid.glsl"
 
 layout(std430) readonly buffer Grid { GridShape grid; };
 uniform usamplerBuffer Photons;

@@ -4,8 +4,8 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
-#include "photon.glsl"
+#include "common/invocation.glsl"
+#include "gather/photon.glsl"
 
 layout(std430) readonly buffer ValuesIn { uint values[]; };
 uniform usamplerBuffer Photons;

@@ -4,12 +4,12 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "texel.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
-#include "grid.glsl"
+#include "common/texel.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
+#include "gather/grid.glsl"
 
 layout(push_constant) uniform Push {
     uint step; // of every how many slots the mean is taken

@@ -6,10 +6,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "statistics.glsl"
-#include "grid.glsl"
+#include "gather/statistics.glsl"
+#include "gather/grid.glsl"
 
 layout(std430) writeonly buffer Grid { GridShape grid; };
 layout(std430) readonly buffer RadiiOfShells { ShellRadii radii_of_shells[]; };

@@ -4,8 +4,8 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
-#include "photon.glsl"
+#include "common/invocation.glsl"
+#include "gather/photon.glsl"
 
 uniform usamplerBuffer Photons;
 layout(std430) readonly buffer PhotonCount { uint photon_count; };

@@ -4,7 +4,7 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 
 layout(push_constant) uniform Push {
     uint meshes;

@@ -4,8 +4,8 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
-#include "status.glsl"
+#include "common/invocation.glsl"
+#include "common/status.glsl"
 
 layout(push_constant) uniform Push {
     uint cells;

@@ -5,9 +5,9 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
-#include "photon.glsl"
-#include "object_grid.glsl"
+#include "common/invocation.glsl"
+#include "gather/photon.glsl"
+#include "trace/object_grid.glsl"
 
 uniform usamplerBuffer Photons;
 layout(std430) readonly buffer PhotonCount { uint photon_count; };

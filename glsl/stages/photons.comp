@@ -6,28 +6,19 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "random.glsl"
-#include "texel.glsl"
-#include "scene.glsl"
-#include "intersect.glsl"
-#include "texture.glsl"
-#include "alpha.glsl"
-#include "bsdf.glsl"
-#include "dispersion.glsl"
-#include "media.glsl"
-#include "contact.glsl"
-#include "encounter.glsl"
-#include "light.glsl"
-#include "guide.glsl"
-#include "path_start.glsl"
-#include "photon.glsl"
-#include "grid.glsl"
-#include "demand.glsl"
-#include "status.glsl"
+#include "common/texel.glsl"
+#include "common/random.glsl"
+#include "trace/interaction.glsl"
+#include "bsdf/bsdf.glsl"
+#include "lights/light.glsl"
+#include "lights/aim.glsl"
+#include "common/path_start.glsl"
+#include "gather/photon.glsl"
+#include "gather/grid.glsl"
+#include "gather/demand.glsl"
+#include "common/status.glsl"
 
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
 layout(constant_id = 25) const bool DROP_UNWANTED = true; // photons that no visible point can accept aren't stored
@@ -73,11 +64,8 @@ Path path_from(uint start) {
 bool survives(inout vec3 flux, vec3 scattered, float u) {
     float arriving = largest(flux);
     float probability = arriving > 0.0 ? min(1.0, largest(scattered) / arriving) : 0.0;
-    if (u >= probability) {
-        return false;
-    }
-    flux = scattered / probability;
-    return true;
+    flux = scattered / max(probability, 1e-37);
+    return u < probability;
 }
 
 // What visible points want of a photon: see `demand`.
@@ -107,8 +95,9 @@ void main() {
     uint rays = 0u;    // of the path
     uint next = lane;
     bool alive = false;
-    Path path;
-    Random random;
+    // What is the same for all paths is known before the loop: it takes no registers of each lane.
+    Random random = random_of_path(lane);
+    Path path = Path(vec3(0.0), vec3(0.0), vec3(0.0), 0u, NO_TRIANGLE, IN_VACUUM, 0.0, true, true, 0.0);
     uint truncated = 0u;
     uint non_finite = 0u;
     bool finished = false;
@@ -120,8 +109,7 @@ void main() {
             }
             finished = next >= push.path_count;
             if (!finished) {
-                random = random_of_path(next);
-                random.dimension = START_NUMBERS;
+                turn_to_path(random, next);
                 path = path_from(next);
                 value = 0.0;
                 rays = 0u;
@@ -138,30 +126,22 @@ void main() {
             alive = alive && loops_cut;
         } else if (!loops_cut) {
             vec3 incoming = path.direction;
-            Encounter met = encounter(hit, incoming, path.media, false, random);
-            Material material = met.material;
-            if (ABSORPTION) {
-                path.flux *= transmittance(met.through.first, hit.t);
-            }
-            if (PUNCTUAL_LIGHTS) {
-                // A range is how far the light itself reaches, not what it lights.
-                path.flux *= range_window(path.inverse_range, hit.t);
-                path.inverse_range = 0.0;
-            }
+            SurfaceInteraction met = interact(hit, incoming, path.media, false, random);
+            path.flux *= transmittance(met.through.first, hit.t);
+            // A range is how far the light itself reaches, not what it lights.
+            path.flux *= range_window(path.inverse_range, hit.t);
+            path.inverse_range = 0.0;
+            path.ignored = met.surface.triangle;
             alive = largest(path.flux) > 0.0;
-            bool hidden = NESTED && met.hidden;
-            if (NESTED && hidden) {
+            if (met.hidden) {
                 path.flux *= met.tint;
                 path.media = met.beyond;
                 // No ray to a light passes it.
                 path.seen_directly = false;
             } else if (alive) {
                 vec4 u = next4(random);
-                bool stores = choose_part(material, u.w) || is_matte(material) || is_glossy(material) ||
-                              (is_coated(material) && material.coat_roughness * material.coat_roughness >= FOLLOWED_ALPHA);
-                vec3 landing = path.flux;
-                if (stores) {
-                    landing *= landing_correction(met.facing, incoming);
+                if (keeps_photons(met.material)) {
+                    vec3 landing = path.flux * landing_correction(met.frame, incoming);
                     if (!finite(landing)) {
                         non_finite += 1u;
                     } else if (!(SAMPLE_LIGHTS && path.seen_directly)) {
@@ -175,72 +155,39 @@ void main() {
                             float flux = (landing.r + landing.g + landing.b) * (1.0 / 3.0);
                             value = min(value + wanted * flux * flux, 1e37);
                             if (stored < settings.lane_capacity) {
-                                Photon photon;
-                                photon.position_object =
-                                    vec4(met.surface.position, uintBitsToFloat(met.surface.object | map << 31u));
-                                vec3 flux_there = landing;
-                                if (has_coat(met.surface.material)) {
-                                    // Across the ray: a coat has another shading normal than what lies below it.
-                                    flux_there = path.flux / -dot(incoming, met.facing.geometric_normal);
-                                }
                                 // What is there in part is seen in part as well as met in part.
-                                photon.flux_direction =
-                                    vec4(flux_there / met.share, uintBitsToFloat(encode_direction(incoming)));
-                                lane_photons[stored * settings.photon_lanes + lane] = photon;
+                                vec3 flux_there = path.flux * kept_factor(met, incoming) / met.opacity;
+                                lane_photons[stored * settings.photon_lanes + lane] =
+                                    Photon(vec4(met.surface.position, uintBitsToFloat(met.surface.object | map << 31u)),
+                                           vec4(flux_there, uintBitsToFloat(encode_direction(incoming))));
                             }
                             stored += 1u;
                         }
                     }
                 }
                 path.seen_directly = false;
-                float layer = 1.0;
-                if (is_coated(material)) {
-                    layer = choose_layer(material, met.facing, met.surface, incoming, next4(random).x);
-                    landing = path.flux * (layer * landing_correction(met.facing, incoming));
+                BsdfSample way = sample_bsdf(met, incoming, u, path.wavelength, random);
+                float guided = 1.0;
+                if (AIMED && way.lambertian) {
+                    guided = guide(met.surface.position, met.frame.geometric_normal, u, way.direction);
                 }
-                if (is_matte(material) || is_glossy(material)) {
-                    path.caustic = false;
-                    // Drawn around the geometric normal, the outgoing direction needs no second correction.
-                    vec3 outgoing = cosine_direction(met.facing.geometric_normal, u.xy);
-                    float guided = 1.0;
-                    if (AIMED && is_matte(material)) {
-                        guided = guide(met.surface.position, met.facing.geometric_normal, u, outgoing);
-                    }
-                    vec3 scattered = landing * material.base_color;
-                    if (is_glossy(material)) {
-                        scattered = landing * scatter(reflector_of(material), met.facing, -incoming, u, outgoing);
-                    }
-                    alive = dot(outgoing, met.facing.shading_normal) > 0.0 && finite(scattered) &&
-                            survives(path.flux, scattered, u.z);
-                    // Those that are aimed shall come there, with less flux each.
-                    path.flux *= guided;
-                    alive = alive && guided > 0.0;
-                    path.direction = outgoing;
-                } else if (is_mirror(material)) {
-                    float cos_i = -dot(incoming, met.facing.shading_normal);
-                    if (is_coated(material)) {
-                        layer *= coat_passes(material.coat, cos_i);
-                    }
-                    alive = survives(path.flux, path.flux * layer * fresnel_schlick(material.base_color, cos_i), u.z);
-                    path.direction = mirror_direction(met.facing, incoming);
-                } else if (DIELECTRICS) {
-                    if (DISPERSION) {
-                        path.flux *= disperse(material, path.wavelength, random);
-                    }
-                    Boundary boundary = meet_boundary(met.facing, incoming, material, met.outside, u.yw);
-                    bool reflected = u.x < boundary.reflectance;
-                    vec3 weight = reflected ? boundary.reflected_weight : met.tint * boundary.refracted_weight;
-                    alive = survives(path.flux, path.flux * (layer * weight), u.z);
-                    path.direction = reflected ? boundary.reflected : boundary.refracted;
-                    path.media = met.beyond;
-                    if (reflected) {
-                        path.media = met.through;
+                path.flux *= way.color;
+                vec3 scattered = path.flux * way.weight;
+                alive = is_possible(way, met.frame) && finite(scattered) && survives(path.flux, scattered, u.z);
+                // Those that are aimed shall come there, with less flux each.
+                path.flux *= guided;
+                alive = alive && guided > 0.0;
+                path.direction = way.direction;
+                path.caustic = path.caustic && way.specular;
+                if (way.at_boundary) {
+                    path.media = met.through;
+                    if (way.transmitted) {
+                        path.media = met.beyond;
                     }
                 }
+                path.depth += 1u;
             }
             path.origin = origin_towards(met.surface, path.direction);
-            path.ignored = met.surface.triangle;
-            path.depth += hidden ? 0u : 1u;
             if (alive && path.depth >= settings.max_depth) {
                 truncated += 1u;
                 alive = false;

@@ -4,10 +4,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "visible_point.glsl"
-#include "object_grid.glsl"
+#include "gather/visible_point.glsl"
+#include "trace/object_grid.glsl"
 
 const uint BITS = CURVE_BITS / 3u; // of a coordinate
 

@@ -4,9 +4,9 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "visible_point.glsl"
+#include "gather/visible_point.glsl"
 
 // Whether the points have an order already, which equal keys are to keep.
 layout(constant_id = 0) const bool PRESORTED = false;

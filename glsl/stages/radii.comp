@@ -6,10 +6,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
 
 uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer Footprints { float footprints[]; };

@@ -4,12 +4,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "sampling.glsl"
-#include "gloss.glsl"
-#include "scene.glsl"
-#include "intersect.glsl"
+#include "common/texel.glsl"
+#include "trace/intersect.glsl"
 
 layout(push_constant) uniform Push {
     uint count;

@@ -4,10 +4,10 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
 
 layout(std430) writeonly buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) writeonly buffer GatheredOf { Gathered gathered[]; };

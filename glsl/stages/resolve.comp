@@ -5,12 +5,12 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "sampling.glsl"
-#include "visible_point.glsl"
-#include "statistics.glsl"
-#include "status.glsl"
+#include "common/sampling.glsl"
+#include "gather/visible_point.glsl"
+#include "gather/statistics.glsl"
+#include "common/status.glsl"
 
 layout(push_constant) uniform Push {
     uint iterations;

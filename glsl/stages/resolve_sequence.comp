@@ -4,11 +4,11 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "settings.glsl"
-#include "sampling.glsl"
-#include "visible_point.glsl"
-#include "status.glsl"
+#include "common/sampling.glsl"
+#include "gather/visible_point.glsl"
+#include "common/status.glsl"
 
 layout(push_constant) uniform Push { uint iterations; } push; // of the sequence
 

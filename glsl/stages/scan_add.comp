@@ -5,7 +5,7 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "layout.glsl"
 
 layout(push_constant) uniform Push {
@@ -16,7 +16,7 @@ layout(std430) buffer Scan { uint scan[]; };
 layout(std430) readonly buffer ScanSums { uint scan_sums[]; };
 layout(std430) writeonly buffer ScanTotal { uint scan_total; };
 
-#include "workgroup_scan.glsl"
+#include "common/workgroup_scan.glsl"
 
 void main() {
     uint me = gl_LocalInvocationID.x;

@@ -5,7 +5,7 @@
 
 layout(local_size_x = 128) in;
 
-#include "invocation.glsl"
+#include "common/invocation.glsl"
 #include "layout.glsl"
 
 const uint PER_THREAD = SCAN_BLOCK / gl_WorkGroupSize.x;
@@ -17,7 +17,7 @@ layout(push_constant) uniform Push {
 layout(std430) buffer Scan { uint scan[]; };
 layout(std430) writeonly buffer ScanSums { uint scan_sums[]; };
 
-#include "workgroup_scan.glsl"
+#include "common/workgroup_scan.glsl"
 
 void main() {
     uint first = invocation_index() * PER_THREAD;

@@ -4,8 +4,8 @@
 
 layout(local_size_x = 128) in;
 
-#include "invocation.glsl"
-#include "sort.glsl"
+#include "common/invocation.glsl"
+#include "common/sort.glsl"
 
 layout(std430) readonly buffer KeysIn { uint keys_in[]; };
 layout(std430) writeonly buffer Histograms { uint histograms[]; };

@@ -5,12 +5,12 @@
 
 layout(local_size_x = 64) in;
 
-#include "invocation.glsl"
-#include "sort.glsl"
+#include "common/invocation.glsl"
+#include "common/sort.glsl"
 
 layout(std430) buffer Histograms { uint histograms[]; };
 
-#include "workgroup_scan.glsl"
+#include "common/workgroup_scan.glsl"
 
 void main() {
     uint me = gl_LocalInvocationID.x;

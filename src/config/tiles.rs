@@ -1,4 +1,4 @@
-//! The order of pixels in memory: `glsl/shared/visible_point.glsl`.
+//! The order of pixels in memory: `glsl/gather/visible_point.glsl`.
 
 use crate::layout::TILE;
 

@@ -1,4 +1,4 @@
-//! The table that aims photon paths: `glsl/shared/emission_table.glsl`.
+//! The table that aims photon paths: `glsl/lights/emission_table.glsl`.
 
 use std::ops::Range;
 

@@ -184,7 +184,7 @@ device_structs! {
         pub radius2: f32,
     }
 
-    /// Of the radii of discs in a shell around the camera, see `glsl/shared/grid.glsl`.
+    /// Of the radii of discs in a shell around the camera, see `glsl/gather/grid.glsl`.
     pub struct ShellRadii: 16 {
         /// Σ log2 R of a sample of them, offset, in parts of 256.
         pub logs: u32,

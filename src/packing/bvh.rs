@@ -16,7 +16,7 @@ use crate::layout::{BvhRecord, LEAF, PLACEMENT_RECORD, RAY_RECORD};
 use crate::scene::{Placement, Scene};
 
 /// Levels of inner nodes at the most, of both hierarchies that a ray is in together: entries of the traversal's stack in
-/// `glsl/shared/intersect.glsl`, but for one that is written and not read.
+/// `glsl/trace/intersect.glsl`, but for one that is written and not read.
 const MOST_LEVELS: u32 = 63;
 /// Levels of shared triangles' hierarchies where render space's leaves as many.
 const SHARED_LEVELS: u32 = 40;

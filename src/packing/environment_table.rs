@@ -8,7 +8,7 @@ use crate::scene::Environment;
 const UNIFORM: f64 = 0.1;
 
 impl Environment {
-    /// The picture with the probabilities by which directions are chosen, as `glsl/shared/environment.glsl` reads it: the
+    /// The picture with the probabilities by which directions are chosen, as `glsl/lights/environment.glsl` reads it: the
     /// size, and the rotation in turns; of each row the cosines at its upper and lower edge; the pixels. w: of rows and of a row's pixels, the
     /// probability of each and those before it.
     pub(crate) fn table(&self) -> Vec<[f32; 4]> {

@@ -433,7 +433,7 @@ fn area_of_all(scene: &Scene) -> f64 {
     own.chain(placed).map(area).sum()
 }
 
-/// Unit vector to two 16-bit numbers, as `glsl/shared/sampling.glsl` has it.
+/// Unit vector to two 16-bit numbers, as `glsl/common/sampling.glsl` has it.
 pub fn encode_direction(direction: Vec3) -> u32 {
     let length = direction.abs().element_sum();
     let (mut x, mut y) = (direction.x / length, direction.y / length);

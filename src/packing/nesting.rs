@@ -10,7 +10,7 @@ use crate::scene::{Scene, Surface};
 pub(crate) const ALONE: u32 = 0xfffe;
 /// Faces may be so far apart and touch for rays, in render units.
 const APART: f32 = 1e-5;
-/// Names of media have so many bits for a material: see `glsl/shared/media.glsl`.
+/// Names of media have so many bits for a material: see `glsl/trace/media.glsl`.
 const MOST_MATERIALS: usize = 0xffff;
 
 /// The order of the objects that are solid dielectrics.

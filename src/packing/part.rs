@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3, dvec2};
 
 use crate::layout::Light;
 
-/// A part of a triangle: `glsl/shared/light.glsl` has the same.
+/// A part of a triangle: `glsl/lights/light.glsl` has the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Part {
     column: f64,

@@ -1,4 +1,4 @@
-//! Sobol' points in four dimensions with Owen's scrambling: `glsl/shared/sobol.glsl`, bit for bit.
+//! Sobol' points in four dimensions with Owen's scrambling: `glsl/common/sobol.glsl`, bit for bit.
 
 /// A primitive polynomial over GF(2) and initial numbers: Joe and Kuo, «Constructing Sobol sequences with better
 /// two-dimensional projections», 2008 (degree, inner coefficients, m).

@@ -36,7 +36,7 @@ impl Placement {
         DAffine3::from_cols(column(0), column(1), column(2), column(3))
     }
 
-    /// Where it puts a point, with the roundings of `placed` in `glsl/shared/scene.glsl`.
+    /// Where it puts a point, with the roundings of `placed` in `glsl/trace/triangles.glsl`.
     pub fn point(&self, p: Vec3) -> Vec3 {
         Vec3::from_array(self.rows.map(|[x, y, z, w]| x * p.x + y * p.y + z * p.z + w))
     }

@@ -1,4 +1,6 @@
-// What all gathers share. Include after sampling.glsl, texel.glsl, photon.glsl, visible_point.glsl and statistics.glsl.
+// What all gathers share. Include after photon.glsl, visible_point.glsl and statistics.glsl.
+
+#include "bsdf/reflection.glsl"
 
 // Whether the photons tested are counted, for reports.
 layout(constant_id = 0) const bool COUNT_TESTS = false;
@@ -15,15 +17,12 @@ struct Receiver {
     float radius2;
     uint object; // with its map's bit, as photons have it; NO_OBJECT where there is no visible point
     vec3 normal; // of any length
-    // Of glossy scenes.
-    vec3 shading_normal;
-    vec3 viewer;
-    Reflector reflector;
-    bool coated;
+    VisibleBsdf bsdf;
 };
 
-const Receiver NO_RECEIVER = Receiver(vec3(0.0), -1.0, NO_OBJECT, vec3(0.0), vec3(0.0), vec3(0.0),
-                                      NO_REFLECTOR, false);
+Receiver no_receiver() {
+    return Receiver(vec3(0.0), -1.0, NO_OBJECT, vec3(0.0), no_visible_bsdf());
+}
 
 // R² of a slot for a photon map.
 float radius2_at(uint slot, uint map) {
@@ -33,18 +32,12 @@ float radius2_at(uint slot, uint map) {
 
 Receiver receiver_at(uint slot, uint map) {
     VisiblePoint point = VISIBLE_POINT(VisiblePoints, slot);
-    Receiver receiver = NO_RECEIVER;
-    receiver.position = point.position_object.xyz;
-    receiver.radius2 = radius2_at(slot, map);
-    receiver.object = floatBitsToUint(point.position_object.w);
+    Receiver receiver = Receiver(point.position_object.xyz, radius2_at(slot, map),
+                                 floatBitsToUint(point.position_object.w), vec3(0.0), no_visible_bsdf());
     receiver.object |= receiver.object != NO_OBJECT && map == 1u ? CAUSTIC : 0u;
     receiver.normal = decode_octahedral(floatBitsToUint(point.weight_normal.w));
-    if (GLOSSY) {
-        Gloss gloss = GLOSS(GlossOf, slot);
-        receiver.shading_normal = decode_direction(floatBitsToUint(point.emitted_normal.w));
-        receiver.viewer = decode_direction(floatBitsToUint(gloss.diffuse_viewer.w));
-        receiver.reflector = reflector_of(gloss);
-        receiver.coated = is_coated(gloss);
+    if (carries_bsdf()) {
+        receiver.bsdf = unpack_bsdf(GLOSS(GlossOf, slot), decode_direction(floatBitsToUint(point.emitted_normal.w)));
     }
     return receiver;
 }
@@ -78,13 +71,9 @@ void gather(Receiver receiver, Photon photon, inout Sum sum) {
     float distance2;
     bool accepted = accepts(receiver, photon, distance2);
     vec3 flux = photon.flux_direction.rgb;
-    if (GLOSSY) {
-        // What is summed up is what the surface scatters to the viewer. A photon that is no match may have no direction.
-        vec3 l = -decode_direction(floatBitsToUint(photon.flux_direction.w));
-        vec3 n = receiver.shading_normal;
-        // Photons on coated objects have it across their rays, since each layer has a normal of its own.
-        float cosine = receiver.coated ? max(dot(n, l), 0.0) : 1.0;
-        flux *= accepted ? cosine * brdf(receiver.reflector, n, receiver.viewer, l) : vec3(0.0);
+    if (carries_bsdf()) {
+        // What is summed up is what the surface scatters to the viewer.
+        flux *= accepted ? gathered_part(receiver.bsdf, floatBitsToUint(photon.flux_direction.w)) : vec3(0.0);
     }
     sum.flux += accepted ? flux : vec3(0.0);
     sum.count += accepted ? 1u : 0u;

@@ -1,7 +1,14 @@
-// Lights. Include after scene.glsl and media.glsl.
+// Lights, and what one of them sends to a point. Include after settings.glsl.
+#ifndef LIGHTS_LIGHT
+#define LIGHTS_LIGHT
 
-#include "alias_table.glsl"
+#include "bsdf/fresnel.glsl"
+#include "lights/alias_table.glsl"
+#include "trace/media.glsl"
 
+layout(constant_id = 14) const bool PUNCTUAL_LIGHTS = false;
+layout(constant_id = 30) const bool SOFT_LIGHTS = false; // some of them have an extent
+layout(constant_id = 15) const bool ENVIRONMENT = false;
 layout(constant_id = 31) const bool PARTED_LIGHTS = false; // triangles whose parts are lights
 
 uniform usamplerBuffer Lights;
@@ -15,8 +22,7 @@ Light light_at(uint i) {
 Media media_of_light(uint light) {
     Media media = IN_VACUUM;
     if (IMMERSED) {
-        uvec4 names = TEXEL_BITS(MediaOfLights, light);
-        media = Media(names.x, names.yzw);
+        media = media_from(TEXEL_BITS(MediaOfLights, light));
     }
     return media;
 }
@@ -33,12 +39,16 @@ vec2 point_of_light(Light light, vec2 u) {
     return uv;
 }
 
-// The light that a place of a triangle belongs to.
-uint light_at_place(Surface surface) {
-    uint light = surface.light;
-    if (PARTED_LIGHTS) {
+bool is_light(Hit hit) {
+    return shading_triangle(hit.triangle).light != NO_LIGHT;
+}
+
+// The light that a place of a triangle belongs to; NO_LIGHT where it doesn't shine.
+uint light_at_place(Hit hit) {
+    uint light = shading_triangle(hit.triangle).light;
+    if (PARTED_LIGHTS && light != NO_LIGHT) {
         float n = light_at(light).position.z;
-        vec2 at = surface.uv * n;
+        vec2 at = vec2(hit.u, hit.v) * n;
         float row = clamp(floor(at.y), 0.0, n - 1.0);
         float column = clamp(floor(at.x), 0.0, n - 1.0 - row);
         bool upside_down = at.x - column + at.y - row > 1.0 && column + row + 1.0 < n;
@@ -50,7 +60,11 @@ uint light_at_place(Surface surface) {
 }
 
 bool is_punctual(uint kind) {
-    return kind == POINT_LIGHT || kind == SPOT_LIGHT || kind == DIRECTIONAL_LIGHT;
+    return PUNCTUAL_LIGHTS && (kind == POINT_LIGHT || kind == SPOT_LIGHT || kind == DIRECTIONAL_LIGHT);
+}
+
+bool is_environment(uint kind) {
+    return ENVIRONMENT && kind == ENVIRONMENT_LIGHT;
 }
 
 float cumulative_probability(uint light) {
@@ -94,11 +108,6 @@ Choice choose_light(float u, vec2 digits) {
     return alias_choice(place, entry.accept, entry.alias);
 }
 
-// Whether light leaves on the triangle's front, or on its back.
-bool emits(Material material, bool front) {
-    return front || (material.flags & BACK_EMITS) != 0u;
-}
-
 // Radiance at this cosine to the normal: a coat lies on lamps too.
 vec3 emitted_radiance(Material material, float cosine) {
     float passed = 1.0;
@@ -117,9 +126,13 @@ float spot_falloff(Light light, float versine) {
 
 // What a light with a range has left at a distance: KHR_lights_punctual's window over the inverse square.
 float range_window(float inverse_range, float distance) {
-    float part = distance * inverse_range;
-    float part2 = part * part;
-    return clamp(1.0 - part2 * part2, 0.0, 1.0);
+    float left = 1.0;
+    if (PUNCTUAL_LIGHTS) {
+        float part = distance * inverse_range;
+        float part2 = part * part;
+        left = clamp(1.0 - part2 * part2, 0.0, 1.0);
+    }
+    return left;
 }
 
 // What reaches a point from a punctual light, or a place of it that u chooses, if nothing is between.
@@ -130,33 +143,32 @@ struct Arriving {
 };
 
 Arriving arriving_from(Light light, vec3 point, vec2 u) {
-    Arriving arriving;
-    if (light.kind == DIRECTIONAL_LIGHT) {
-        arriving = Arriving(-light.direction, 1e30, light.intensity);
-        if (SOFT_LIGHTS && light.extent > 0.0) {
-            arriving.ray = direction_in_cone(arriving.ray, light.extent, u);
-        }
-    } else {
-        vec3 ray = light.position - point;
-        float distance2 = max(dot(ray, ray), 1e-37);
-        float area_over_angle = distance2; // of the light as it is seen
-        if (SOFT_LIGHTS && light.extent > 0.0) {
-            // A disc that looks here is seen as a sphere is, and from within its radius in half of all directions.
-            float radius2 = light.extent * light.extent;
-            float sin2 = radius2 / distance2;
-            float versine = sin2 < 1.0 ? sin2 / (1.0 + sqrt(1.0 - sin2)) : 1.0;
-            vec3 towards = direction_in_cone(ray * inversesqrt(distance2), versine, u);
-            float way = max(dot(towards, ray), 1e-18);
-            ray = way * towards;
-            distance2 = way * way;
-            area_over_angle = radius2 / (2.0 * versine);
-        }
-        vec3 irradiance = light.intensity * (range_window(light.inverse_range, sqrt(distance2)) / area_over_angle);
-        if (light.kind == SPOT_LIGHT) {
-            vec3 off_axis = ray * inversesqrt(distance2) + light.direction;
-            irradiance *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
-        }
-        arriving = Arriving(ray, 1.0, irradiance);
+    bool distant = light.kind == DIRECTIONAL_LIGHT;
+    bool is_soft = SOFT_LIGHTS && light.extent > 0.0;
+    vec3 ray = distant ? -light.direction : light.position - point;
+    float distance2 = max(dot(ray, ray), 1e-37);
+    float area_over_angle = distance2; // of the light as it is seen
+    if (is_soft) {
+        // A disc that looks here is seen as a sphere is, and from within its radius in half of all directions.
+        float radius2 = light.extent * light.extent;
+        float sin2 = radius2 / distance2;
+        float versine = sin2 < 1.0 ? sin2 / (1.0 + sqrt(1.0 - sin2)) : 1.0;
+        vec3 axis = ray * (distant ? 1.0 : inversesqrt(distance2));
+        vec3 towards = direction_in_cone(axis, distant ? light.extent : versine, u);
+        float way = distant ? 1.0 : max(dot(towards, ray), 1e-18);
+        ray = way * towards;
+        distance2 = way * way;
+        area_over_angle = radius2 / (2.0 * versine);
     }
-    return arriving;
+    vec3 irradiance = light.intensity;
+    if (!distant) {
+        irradiance *= range_window(light.inverse_range, sqrt(distance2)) / area_over_angle;
+    }
+    if (light.kind == SPOT_LIGHT) {
+        vec3 off_axis = ray * inversesqrt(distance2) + light.direction;
+        irradiance *= spot_falloff(light, 0.5 * dot(off_axis, off_axis));
+    }
+    return Arriving(ray, distant ? 1e30 : 1.0, irradiance);
 }
+
+#endif

@@ -1,6 +1,11 @@
-// Where photon paths start. Include after random.glsl, environment.glsl and light.glsl.
+// What leaves the lights: where photon paths start. Include after common/random.glsl.
+#ifndef LIGHTS_EMISSION
+#define LIGHTS_EMISSION
 
-#include "guide.glsl"
+#include "lights/aim.glsl"
+#include "lights/environment.glsl"
+#include "trace/opacity.glsl"
+
 
 struct Emission {
     vec3 origin;
@@ -55,28 +60,32 @@ AimedStart emit_from_afar(vec3 towards, vec3 irradiance, float area, vec2 place,
     return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0), passed, true, true);
 }
 
+// From a disc across the rays that covers the target, or the scene.
 AimedStart emit_directional(Light light, vec2 place, vec2 turn, Target target) {
+    AimedStart start;
     if (SOFT_LIGHTS && light.extent > 0.0) {
         vec3 towards = direction_in_cone(-light.direction, light.extent, turn);
-        return emit_from_afar(towards, light.intensity, light.area, place, target);
+        start = emit_from_afar(towards, light.intensity, light.area, place, target);
+    } else {
+        vec3 centre = target.everything ? light.position : target.sphere.xyz;
+        float radius = target.everything ? sqrt(light.area / PI) : target.sphere.w;
+        vec3 passed = centre + basis(light.direction) * vec3(radius * disc_point(place), 0.0);
+        // From a plane before the scene.
+        vec3 origin = passed;
+        float area = light.area;
+        if (!target.everything) {
+            area = PI * radius * radius;
+            origin -= light.direction * dot(passed - light.position, light.direction);
+        }
+        Emission emission = Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0);
+        start = AimedStart(emission, passed, true, true);
     }
-    // A disc across the rays that covers the target, or the scene.
-    vec3 centre = target.everything ? light.position : target.sphere.xyz;
-    float radius = target.everything ? sqrt(light.area / PI) : target.sphere.w;
-    vec3 passed = centre + basis(light.direction) * vec3(radius * disc_point(place), 0.0);
-    // From a plane before the scene.
-    vec3 origin = passed;
-    float area = light.area;
-    if (!target.everything) {
-        area = PI * radius * radius;
-        origin -= light.direction * dot(passed - light.position, light.direction);
-    }
-    return AimedStart(Emission(origin, light.direction, light.intensity * area, NO_TRIANGLE, 0.0), passed, true, true);
+    return start;
 }
 
 AimedStart emit_environment(float area, vec2 place, vec2 direction, Target target) {
     vec3 towards;
-    Sky sky = sample_environment(direction, towards);
+    EnvironmentSample sky = sample_environment(direction, towards);
     return emit_from_afar(towards, sky.radiance / sky.density, area, place, target);
 }
 
@@ -119,8 +128,9 @@ AimedStart emit_point(Light light, vec2 place, vec2 u, Target target) {
 
 AimedStart emit_triangle(Light light, vec2 place, vec2 u, float side, Target target) {
     PlacedTriangle triangle = PlacedTriangle(light.triangle, NO_INSTANCE);
-    Surface emitter = surface_at(triangle, point_of_light(light, place));
-    Material material = emitter_of(emitter);
+    Hit hit = hit_at(triangle, point_of_light(light, place));
+    Surface emitter = surface_at(hit);
+    Material material = emitter_at(hit);
     vec3 normal = emitter.geometric_normal;
     bool both_sides = emits(material, false);
     if (both_sides && side < 0.5) {
@@ -141,23 +151,24 @@ AimedStart emit_triangle(Light light, vec2 place, vec2 u, float side, Target tar
         projected = PI;
     }
     vec3 flux = emitted_radiance(material, max(0.0, dot(direction, normal))) *
-                (projected * sides * light.area * share_there(emitter));
+                (projected * sides * light.area * opacity(hit));
     return AimedStart(Emission(origin, direction, flux, triangle, 0.0), origin, false, in_cone);
 }
 
 // From a light towards a target; flux over the density of the coordinates' choice.
 AimedStart emit_from(uint index, vec2 place, vec2 direction, float side, Target target) {
     Light light = light_at(index);
-    if (PUNCTUAL_LIGHTS && is_punctual(light.kind)) {
-        if (light.kind == DIRECTIONAL_LIGHT) {
-            return emit_directional(light, place, direction, target);
-        }
-        return emit_point(light, place, direction, target);
+    AimedStart start;
+    if (is_punctual(light.kind) && light.kind == DIRECTIONAL_LIGHT) {
+        start = emit_directional(light, place, direction, target);
+    } else if (is_punctual(light.kind)) {
+        start = emit_point(light, place, direction, target);
+    } else if (is_environment(light.kind)) {
+        start = emit_environment(light.area, place, direction, target);
+    } else {
+        start = emit_triangle(light, place, direction, side, target);
     }
-    if (ENVIRONMENT && light.kind == ENVIRONMENT_LIGHT) {
-        return emit_environment(light.area, place, direction, target);
-    }
-    return emit_triangle(light, place, direction, side, target);
+    return start;
 }
 
 // A path without flux where another target comes before the one that it was chosen for.
@@ -165,18 +176,18 @@ Emission emit_aimed(vec4 u, vec4 w, out uint light) {
     EmissionTableSize size = emission_table_size();
     Start start = choose_start(size, u, w);
     light = start.light;
-    if (start.weight == 0.0) {
-        // Not to be traced, see emission::Aim.
-        return Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0);
+    // Of those without a weight none is to be traced, see emission::Aim.
+    Emission emission = Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0);
+    if (start.weight != 0.0) {
+        Target target = EVERYTHING;
+        if (start.target < size.targets) {
+            target = Target(false, target_sphere(start.target));
+        }
+        AimedStart aimed = emit_from(start.light, start.place, start.direction, w.y, target);
+        emission = aimed.emission;
+        bool kept = meets_first(size, start.target, aimed.on_target, aimed.passed, emission.direction, aimed.from_afar);
+        emission.flux *= kept ? start.weight / start.probability : 0.0;
     }
-    Target target = EVERYTHING;
-    if (start.target < size.targets) {
-        target = Target(false, target_sphere(start.target));
-    }
-    AimedStart aimed = emit_from(start.light, start.place, start.direction, w.y, target);
-    Emission emission = aimed.emission;
-    bool kept = meets_first(size, start.target, aimed.on_target, aimed.passed, emission.direction, aimed.from_afar);
-    emission.flux *= kept ? start.weight / start.probability : 0.0;
     return emission;
 }
 
@@ -184,12 +195,16 @@ Emission emit(inout Random random, out uint light) {
     // Place and direction are one point of four dimensions: what is left of the number that chose the light is the first.
     vec4 u = next4(random);
     vec4 w = next4(random);
+    Emission emission;
     if (AIMED) {
-        return emit_aimed(u, w, light);
+        emission = emit_aimed(u, w, light);
+    } else {
+        Choice choice = choose_light(u.x, w.xz);
+        emission = emit_from(choice.index, vec2(choice.rest, u.y), u.zw, w.y, EVERYTHING).emission;
+        emission.flux /= light_at(choice.index).probability;
+        light = choice.index;
     }
-    Choice choice = choose_light(u.x, w.xz);
-    Emission emission = emit_from(choice.index, vec2(choice.rest, u.y), u.zw, w.y, EVERYTHING).emission;
-    emission.flux /= light_at(choice.index).probability;
-    light = choice.index;
     return emission;
 }
+
+#endif

@@ -1,7 +1,15 @@
-// Rays against triangles. Include after scene.glsl.
+// Rays against triangles. Include after settings.glsl and texel.glsl.
+#ifndef TRACE_INTERSECT
+#define TRACE_INTERSECT
+
+#include "trace/triangles.glsl"
 
 layout(constant_id = 0) const bool BRUTE_FORCE = false;
 layout(constant_id = 4) const bool HAVEL = false; // the paper's triangle test instead of the watertight one
+layout(constant_id = 26) const bool COINCIDENCE = false;
+
+uniform usamplerBuffer Bvh;
+uniform usamplerBuffer HavelTriangles;
 
 // Loop iterations that this invocation has made. Some drivers end every loop of an invocation, without a word, once it
 // has made 65,535 of them: the stages stop before and count what they cut short.
@@ -93,40 +101,40 @@ bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, Pla
     vec2 b = beside(ray, corner1);
     vec2 c = beside(ray, corner2);
     vec3 sides = vec3(side_of(b, c), side_of(c, a), side_of(a, b));
-    if (any(lessThan(sides, vec3(0.0))) && any(greaterThan(sides, vec3(0.0)))) {
-        return false;
+    bool accepted = !(any(lessThan(sides, vec3(0.0))) && any(greaterThan(sides, vec3(0.0))));
+    if (accepted) {
+        vec3 n = cross(corner1 - corner0, corner2 - corner0);
+        float t = dot(n, corner0 - ray.origin) / dot(n, ray.direction);
+        float sum = sides.x + sides.y + sides.z;
+        // The sum is 0 of a triangle that the ray sees edge on.
+        accepted = is_nearer(t, at, progress, hit) && sum != 0.0;
+        if (accepted) {
+            float inverse = 1.0 / sum;
+            hit = Hit(t, sides.y * inverse, sides.z * inverse, at.triangle, at.instance);
+        }
     }
-    vec3 n = cross(corner1 - corner0, corner2 - corner0);
-    float t = dot(n, corner0 - ray.origin) / dot(n, ray.direction);
-    float sum = sides.x + sides.y + sides.z;
-    // The sum is 0 of a triangle that the ray sees edge on.
-    if (!(is_nearer(t, at, progress, hit) && sum != 0.0)) {
-        return false;
-    }
-    float inverse = 1.0 / sum;
-    hit = Hit(t, sides.y * inverse, sides.z * inverse, at.triangle, at.instance);
-    return true;
+    return accepted;
 }
 
 // Havel and Herout, «Yet faster ray-triangle intersection (using SSE4)», 2010: the test with precomputed planes.
 // The ray is that of the triangle's own space. Accepts what `is_nearer` does.
 bool intersect_havel(vec3 origin, vec3 direction, PlacedTriangle at, Progress progress, inout Hit hit) {
-    HavelTriangle triangle = havel_triangle(at.triangle);
+    HavelTriangle triangle = HAVEL_TRIANGLE(HavelTriangles, at.triangle);
     float det = dot(direction, triangle.n0.xyz);
     float det_t = triangle.n0.w - dot(origin, triangle.n0.xyz);
     float inverse = 1.0 / det;
     float t = det_t * inverse;
-    if (!is_nearer(t, at, progress, hit)) {
-        return false;
+    bool accepted = is_nearer(t, at, progress, hit);
+    if (accepted) {
+        vec3 point = origin + t * direction;
+        float u = dot(point, triangle.n1.xyz) + triangle.n1.w;
+        float v = dot(point, triangle.n2.xyz) + triangle.n2.w;
+        accepted = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+        if (accepted) {
+            hit = Hit(t, u, v, at.triangle, at.instance);
+        }
     }
-    vec3 point = origin + t * direction;
-    float u = dot(point, triangle.n1.xyz) + triangle.n1.w;
-    float v = dot(point, triangle.n2.xyz) + triangle.n2.w;
-    if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0)) {
-        return false;
-    }
-    hit = Hit(t, u, v, at.triangle, at.instance);
-    return true;
+    return accepted;
 }
 
 // A ray as the boxes of a hierarchy see it, in the space of its triangles. Where that isn't render space, the ray is rounded,
@@ -173,8 +181,13 @@ LocalRay in_instance(Ray ray, mat3x4 rows, float widening) {
 
 bool intersect_triangle(Ray ray, LocalRay local, vec3 corner0, vec3 corner1, vec3 corner2, PlacedTriangle at,
                         Progress progress, inout Hit hit) {
-    return HAVEL ? intersect_havel(local.origin, local.direction, at, progress, hit)
-                 : intersect_watertight(ray, corner0, corner1, corner2, at, progress, hit);
+    bool accepted = false;
+    if (HAVEL) {
+        accepted = intersect_havel(local.origin, local.direction, at, progress, hit);
+    } else {
+        accepted = intersect_watertight(ray, corner0, corner1, corner2, at, progress, hit);
+    }
+    return accepted;
 }
 
 // Entry distance of the ray into a box, or a value above `limit` where it misses.
@@ -191,6 +204,35 @@ float enter_box(vec3 box_min, vec3 box_max, LocalRay ray, float limit) {
 
 // No hierarchy is deeper than 64. One entry more, since compilers that turn arrays of up to 256 bytes into registers spill here.
 const uint STACK_SIZE = 65u;
+const uint FIRST_KEPT_BY_KERNEL = 34u; // the room has those before
+const uint KEPT_SIZE = 47u;
+
+// Memory of an invocation: the stack of a traversal, and behind it what waits until that has ended, since registers are scarce
+// there.
+uint lane_memory[STACK_SIZE + KEPT_SIZE];
+
+void keep(uint at, vec3 value) {
+    lane_memory[STACK_SIZE + at] = floatBitsToUint(value.x);
+    lane_memory[STACK_SIZE + at + 1u] = floatBitsToUint(value.y);
+    lane_memory[STACK_SIZE + at + 2u] = floatBitsToUint(value.z);
+}
+
+vec3 kept(uint at) {
+    return vec3(uintBitsToFloat(lane_memory[STACK_SIZE + at]), uintBitsToFloat(lane_memory[STACK_SIZE + at + 1u]),
+                uintBitsToFloat(lane_memory[STACK_SIZE + at + 2u]));
+}
+
+void keep(uint at, uvec4 value) {
+    lane_memory[STACK_SIZE + at] = value.x;
+    lane_memory[STACK_SIZE + at + 1u] = value.y;
+    lane_memory[STACK_SIZE + at + 2u] = value.z;
+    lane_memory[STACK_SIZE + at + 3u] = value.w;
+}
+
+uvec4 kept_bits(uint at) {
+    return uvec4(lane_memory[STACK_SIZE + at], lane_memory[STACK_SIZE + at + 1u], lane_memory[STACK_SIZE + at + 2u],
+                 lane_memory[STACK_SIZE + at + 3u]);
+}
 
 const float TIE = 16.0 / 16777216.0; // of a distance, that rounding may change
 
@@ -248,21 +290,17 @@ Hit trace_all(Ray ray, Progress progress, float limit, PlacedTriangle ignored, b
     return hit;
 }
 
-// The nearest triangle but `ignored` after `progress` and before t = limit. With any_hit: some triangle there.
-Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
-    Ray ray = ray_frame(origin, direction);
-    if (BRUTE_FORCE) {
-        return trace_all(ray, progress, limit, ignored, any_hit);
-    }
+// As `trace_from`, by the hierarchy.
+Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
     Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
     LocalRay local = in_render_space(ray);
     uint instance = NO_INSTANCE; // that the lane is in
     uint outside = STACK_SIZE; // the depth of the stack at which it leaves that
-    uint stack[STACK_SIZE];
     uint depth = 0u;
     uint limit_of_loops = settings.loop_limit; // kept at hand: some drivers load it anew in each step
     uint reference = 0u;
     bool complete = false;
+    bool over = false; // any hit was asked for and found
     // A step takes a node or a triangle, whichever the lane is at: no lane of a subgroup waits for another's leaf.
     do {
         loop_count += 1u;
@@ -270,7 +308,7 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
         BvhRecord record = BVH_RECORD(Bvh, reference & ~LEAF);
         uint far_child = 0u;
         bool push = false;
-        bool pop;
+        bool pop = false;
         if (is_leaf) {
             uint index = floatBitsToUint(record.row3.x);
             vec3 corner0 = record.row0.xyz;
@@ -288,9 +326,7 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
                 tests = floatBitsToUint(record.row3.z) == 0u && (tests || instance != ignored.instance);
             }
             PlacedTriangle at = PlacedTriangle(index, instance);
-            if (tests && intersect_triangle(ray, local, corner0, corner1, corner2, at, progress, hit) && any_hit) {
-                return hit;
-            }
+            over = tests && intersect_triangle(ray, local, corner0, corner1, corner2, at, progress, hit) && any_hit;
             pop = floatBitsToUint(record.row3.y) == 1u;
             reference += 1u;
             if (INSTANCED) {
@@ -317,7 +353,7 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
             pop = min(enter_left, enter_right) >= 1e30;
         }
         // Written whether it counts or not: stores under a condition are far dearer on drivers that carry lanes in SIMD.
-        stack[depth] = far_child;
+        lane_memory[depth] = far_child;
         depth += push ? 1u : 0u;
         if (pop) {
             if (INSTANCED) {
@@ -329,10 +365,22 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
             }
             complete = depth == 0u;
             depth = max(depth, 1u) - 1u;
-            reference = stack[depth];
+            reference = lane_memory[depth];
         }
-    } while (!complete && loop_count < limit_of_loops);
-    loops_cut = loops_cut || !complete;
+    } while (!complete && !over && loop_count < limit_of_loops);
+    loops_cut = loops_cut || !(complete || over);
+    return hit;
+}
+
+// The nearest triangle but `ignored` after `progress` and before t = limit. With any_hit: some triangle there.
+Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
+    Ray ray = ray_frame(origin, direction);
+    Hit hit = NO_HIT;
+    if (BRUTE_FORCE) {
+        hit = trace_all(ray, progress, limit, ignored, any_hit);
+    } else {
+        hit = trace_hierarchy(ray, progress, limit, ignored, any_hit);
+    }
     return hit;
 }
 
@@ -340,3 +388,5 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
 Hit trace(vec3 origin, vec3 direction, float limit, PlacedTriangle ignored, bool any_hit) {
     return trace_from(origin, direction, AT_ORIGIN, limit, ignored, any_hit);
 }
+
+#endif

@@ -1,4 +1,7 @@
 // A grid of cubes for each object: its bounding box, the longest axis split into a fixed number of pieces. The scene's.
+#ifndef TRACE_OBJECT_GRID
+#define TRACE_OBJECT_GRID
+
 #include "layout.glsl"
 
 uniform usamplerBuffer ObjectGrids;
@@ -22,3 +25,5 @@ vec3 reach_of(uint object) {
     ObjectGrid grid = object_grid(object);
     return max(abs(grid.low), abs(grid.low + vec3(grid.cells) / grid.inverse_cell));
 }
+
+#endif

@@ -1,5 +1,8 @@
-// Where aimed photon paths start: boxes of starts, each with a probability of its own. Include after texel.glsl and
-// light.glsl. `emission::Table::texels` writes the buffer: its counts, the spheres that paths are aimed at, the cells.
+// Where aimed photon paths start: boxes of starts, each with a probability of its own. `emission::Table::texels` writes the buffer: its counts, the spheres that paths are aimed at, the cells.
+#ifndef LIGHTS_EMISSION_TABLE
+#define LIGHTS_EMISSION_TABLE
+
+#include "lights/light.glsl"
 
 uniform usamplerBuffer EmissionTable;
 
@@ -59,13 +62,14 @@ bool meets_sphere(vec4 sphere, vec3 origin, vec3 direction, bool from_afar) {
 
 // Whether it meets the target, unless that is known, and none of those before it.
 bool meets_first(EmissionTableSize size, uint target, bool known, vec3 origin, vec3 direction, bool from_afar) {
-    if (!known && target < size.targets && !meets_sphere(target_sphere(target), origin, direction, from_afar)) {
-        return false;
+    bool meets = known || target >= size.targets;
+    if (!meets) {
+        meets = meets_sphere(target_sphere(target), origin, direction, from_afar);
     }
-    for (uint i = 0u; i < min(target, size.targets); i++) {
-        if (meets_sphere(target_sphere(i), origin, direction, from_afar)) {
-            return false;
-        }
+    for (uint i = 0u; i < min(target, size.targets) && meets; i++) {
+        meets = !meets_sphere(target_sphere(i), origin, direction, from_afar);
     }
-    return true;
+    return meets;
 }
+
+#endif

@@ -1,5 +1,9 @@
 // Light of one wavelength. A path has none until it meets a boundary that bends each its own way; then it is chosen, evenly,
 // and what the path carries is coloured so that all wavelengths together are white.
+#ifndef BSDF_DISPERSION
+#define BSDF_DISPERSION
+
+#include "bsdf/material.glsl"
 
 float lobe(float wavelength, float centre, float left, float right) {
     float t = (wavelength - centre) * (wavelength < centre ? left : right);
@@ -39,3 +43,5 @@ vec3 disperse(inout Material material, inout float wavelength, inout Random rand
     }
     return color;
 }
+
+#endif

@@ -1,5 +1,7 @@
 // The alias method: Vose, «A Linear Algorithm For Generating Random Numbers With a Given Distribution», IEEE Transactions
 // on Software Engineering 17(9), 1991. `alias.rs` makes the tables.
+#ifndef LIGHTS_ALIAS_TABLE
+#define LIGHTS_ALIAS_TABLE
 
 // A cell of a table, and how far into it a number lies.
 struct AliasPlace {
@@ -28,8 +30,9 @@ AliasPlace alias_place(uint count, float u, vec2 digits) {
 
 // `accept`: the part of the cell that chooses what has its number; `alias`: what the rest of it chooses.
 Choice alias_choice(AliasPlace place, float accept, uint alias) {
-    if (place.within < accept || accept >= 1.0) {
-        return Choice(place.cell, min(place.within / accept, 1.0));
-    }
-    return Choice(alias, min((place.within - accept) / (1.0 - accept), 1.0));
+    bool own = place.within < accept || accept >= 1.0;
+    float rest = own ? place.within / accept : (place.within - accept) / (1.0 - accept);
+    return Choice(own ? place.cell : alias, min(rest, 1.0));
 }
+
+#endif

@@ -15,3 +15,12 @@ const uint START_NUMBERS = 2u;
 Random random_of_path(uint path) {
     return random_of_photon(push.first_path + path, push.iteration, push.block, push.first_of_sequence, settings.seed);
 }
+
+// From a path's numbers to those of another one, after its start.
+void turn_to_path(inout Random random, uint path) {
+    Random other = random_of_path(path);
+    random.path = other.path;
+    random.index = other.index;
+    random.state = other.state;
+    random.dimension = START_NUMBERS;
+}

@@ -1,5 +1,9 @@
 // Which source of light a point asks: each of a few, or one by what each can bring to it at the most. Conty Estévez and Kulla, «Importance Sampling of
-// Many Lights with Adaptive Tree Splitting», HPG 2018. Include after light.glsl.
+// Many Lights with Adaptive Tree Splitting», HPG 2018.
+#ifndef LIGHTS_LIGHT_SOURCES
+#define LIGHTS_LIGHT_SOURCES
+
+#include "lights/light.glsl"
 
 layout(constant_id = 28) const bool FEW_SOURCES = false; // but more than one
 layout(constant_id = 29) const bool MANY_SOURCES = false;
@@ -18,27 +22,27 @@ float cos_beyond(float cos_a, float cos_b) {
 
 // Irradiance at the most, up to a factor.
 float most_from(LightSource source, vec3 position, vec3 normal) {
-    if (source.kind == ENVIRONMENT_LIGHT) {
-        return source.strength;
-    }
-    if (source.kind == DIRECTIONAL_LIGHT) {
-        return source.strength * max(0.0, cos_beyond(-dot(normal, source.axis), source.cos_cone));
-    }
     vec3 to_centre = source.centre - position;
     float distance2 = dot(to_centre, to_centre);
     float radius2 = source.radius * source.radius;
-    if (distance2 <= radius2) {
-        return source.strength / max(radius2, 1e-37);
+    float most = source.strength / max(radius2, 1e-37);
+    if (source.kind == ENVIRONMENT_LIGHT) {
+        most = source.strength;
+    } else if (source.kind == DIRECTIONAL_LIGHT) {
+        most = source.strength * max(0.0, cos_beyond(-dot(normal, source.axis), source.cos_cone));
+    } else if (distance2 > radius2) {
+        float inverse_distance = inversesqrt(max(distance2, 1e-37));
+        // The angle that its sphere is seen at.
+        float cos_width = sqrt(max(0.0, 1.0 - radius2 / distance2));
+        float cos_surface = cos_beyond(dot(normal, to_centre) * inverse_distance, cos_width);
+        float cos_light =
+            cos_beyond(cos_beyond(-dot(source.axis, to_centre) * inverse_distance, source.cos_cone), cos_width);
+        bool is_lambertian = source.kind == TRIANGLE_LIGHT;
+        cos_light = is_lambertian ? max(cos_light, 0.0) : (cos_light >= 1.0 ? 1.0 : 0.0);
+        bool in_range = (1.0 / inverse_distance - source.radius) * source.inverse_range < 1.0;
+        most = in_range ? source.strength * max(0.0, cos_surface) * cos_light * inverse_distance * inverse_distance : 0.0;
     }
-    float inverse_distance = inversesqrt(max(distance2, 1e-37));
-    // The angle that its sphere is seen at.
-    float cos_width = sqrt(max(0.0, 1.0 - radius2 / distance2));
-    float cos_surface = cos_beyond(dot(normal, to_centre) * inverse_distance, cos_width);
-    float cos_light = cos_beyond(cos_beyond(-dot(source.axis, to_centre) * inverse_distance, source.cos_cone), cos_width);
-    bool is_lambertian = source.kind == TRIANGLE_LIGHT;
-    cos_light = is_lambertian ? max(cos_light, 0.0) : (cos_light >= 1.0 ? 1.0 : 0.0);
-    bool in_range = (1.0 / inverse_distance - source.radius) * source.inverse_range < 1.0;
-    return in_range ? source.strength * max(0.0, cos_surface) * cos_light * inverse_distance * inverse_distance : 0.0;
+    return most;
 }
 
 bool has_light(LightSource source, uint light) {
@@ -71,10 +75,8 @@ Brought brought_to(vec3 position, vec3 normal, uint light) {
 
 // Where none can bring anything, nothing is lost by any choice.
 float probability_of_source(Brought brought, float most, float without_point) {
-    if (brought.all <= 0.0) {
-        return without_point;
-    }
-    return most > 0.0 ? mix(most / brought.all, without_point / brought.probability, WITHOUT_POINT) : 0.0;
+    float with_point = most > 0.0 ? mix(most / brought.all, without_point / brought.probability, WITHOUT_POINT) : 0.0;
+    return brought.all <= 0.0 ? without_point : with_point;
 }
 
 struct LightChoice {
@@ -110,3 +112,5 @@ float probability_for(vec3 position, vec3 normal, uint light) {
     float of_source = probability_of_source(brought, brought.by_one, brought.probability_of_one);
     return of_source * probability_within(light);
 }
+
+#endif

@@ -1,11 +1,17 @@
-// What shines from afar. Include after sampling.glsl, texel.glsl and scene.glsl.
+// What shines from afar.
 //
 // The picture is equirectangular: its upper edge is +Y, its centre +Z, and -X lies to the right of it. The buffer has its
 // size and how far it is rotated about +Y, in turns, then each row's cosines at the upper and the lower edge, then the pixels; w: the probability of a row, or of a
 // pixel within its row, and those before it, in multiples of 2⁻²⁴ as random numbers are.
+#ifndef LIGHTS_ENVIRONMENT
+#define LIGHTS_ENVIRONMENT
+
+#include "lights/light.glsl"
+
+
 uniform usamplerBuffer Environment;
 
-struct Sky {
+struct EnvironmentSample {
     vec3 radiance;
     float density; // by which sample_environment chooses the direction, per solid angle
 };
@@ -83,7 +89,7 @@ float rows_below_pole(uvec2 size, float across, float up) {
 
 // A direction, nearly in proportion to the radiance from there; uniform within a pixel. The pixel is the one that was
 // chosen: looked up again from the direction it may be the next one, by rounding, and that one's density much smaller.
-Sky sample_environment(vec2 u, out vec3 direction) {
+EnvironmentSample sample_environment(vec2 u, out vec3 direction) {
     uvec2 size = environment_size();
     Entry row = choose_entry(1u, size.y, u.y);
     Entry column = choose_entry(1u + size.y + row.index * size.x, size.x, u.x);
@@ -93,12 +99,12 @@ Sky sample_environment(vec2 u, out vec3 direction) {
     float turn = float(column.index) + column.within;
     float phi = 2.0 * PI * (turn / float(size.x) - 0.5 - environment_rotation());
     direction = normalize(vec3(-across * sin(phi), up, across * cos(phi)));
-    return Sky(environment_radiance(size, vec2(turn, rows_below_pole(size, across, up))),
+    return EnvironmentSample(environment_radiance(size, vec2(turn, rows_below_pole(size, across, up))),
                row.probability * column.probability / solid_angle_of_pixel(size, edges));
 }
 
-// What comes from a direction, which is a unit vector.
-Sky environment_at(vec3 direction) {
+// What comes from a direction, which is a unit vector, and its density.
+EnvironmentSample environment_at(vec3 direction) {
     uvec2 size = environment_size();
     float turn = fract(0.5 + angle_of(-direction.x, direction.z) / (2.0 * PI) + environment_rotation());
     vec2 place = vec2(turn * float(size.x), rows_below_pole(size, length(direction.xz), direction.y));
@@ -106,5 +112,16 @@ Sky environment_at(vec3 direction) {
     vec2 edges = TEXEL(Environment, 1u + pixel.y).xy;
     float probability = probability_of_entry(1u, pixel.y) *
                         probability_of_entry(1u + size.y + pixel.y * size.x, pixel.x);
-    return Sky(environment_radiance(size, place), probability / solid_angle_of_pixel(size, edges));
+    return EnvironmentSample(environment_radiance(size, place), probability / solid_angle_of_pixel(size, edges));
 }
+
+// What a ray sees that meets no surface.
+vec3 radiance_from_afar(vec3 direction) {
+    vec3 radiance = vec3(0.0);
+    if (ENVIRONMENT) {
+        radiance = environment_at(direction).radiance;
+    }
+    return radiance;
+}
+
+#endif

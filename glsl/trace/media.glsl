@@ -1,6 +1,14 @@
 // The solid dielectrics that a ray is in. Where several overlap, the one of the lowest rank is there, and the boundaries of the
 // others don't count: Schmidt and Budge, «Simple Nested Dielectrics in Ray Traced Images», Journal of Graphics Tools 7(2), 2002.
-// Include after scene.glsl.
+#ifndef TRACE_MEDIA
+#define TRACE_MEDIA
+
+#include "bsdf/material.glsl"
+#include "trace/intersect.glsl"
+
+layout(constant_id = 13) const bool ABSORPTION = false;
+layout(constant_id = 27) const bool NESTED = false;
+layout(constant_id = 32) const bool IMMERSED = false; // paths start in dielectrics
 
 // Their names in order, VACUUM where there are fewer. Of more than four the highest ranks are forgotten.
 struct Media {
@@ -13,6 +21,15 @@ const Media IN_VACUUM = Media(VACUUM, uvec3(VACUUM));
 // A medium's name: its object's rank, then its material. VACUUM comes last.
 uint medium_of(Surface surface) {
     return (surface.flags & ~RANK_BELOW) | surface.material;
+}
+
+// Of a path that starts in these.
+Media media_from(uvec4 names) {
+    Media media = IN_VACUUM;
+    if (IMMERSED) {
+        media = Media(names.x, names.yzw);
+    }
+    return media;
 }
 
 uint material_of_medium(uint medium) {
@@ -73,12 +90,37 @@ uint left_medium(Media media, uint medium) {
     return left;
 }
 
+// In the invocation's memory.
+void keep_media(uint at, Media media) {
+    lane_memory[STACK_SIZE + at] = media.first;
+    if (NESTED) {
+        keep(at, uvec4(media.first, media.others));
+    }
+}
+
+Media kept_media(uint at) {
+    Media media = IN_VACUUM;
+    media.first = lane_memory[STACK_SIZE + at];
+    if (NESTED) {
+        media.others = kept_bits(at).yzw;
+    }
+    return media;
+}
+
 // What a medium leaves of light over a distance.
 vec3 transmittance(uint medium, float distance) {
-    bool absorbs = ABSORPTION && medium != VACUUM;
-    vec3 absorption = vec3(0.0);
-    if (absorbs) {
-        absorption = material_at(material_of_medium(medium)).absorption;
+    vec3 left = vec3(1.0);
+    if (ABSORPTION) {
+        vec3 absorption = medium == VACUUM ? vec3(0.0) : material_at(material_of_medium(medium)).absorption;
+        left = exp(-absorption * distance);
     }
-    return exp(-absorption * distance);
+    return left;
 }
+
+// What a face bounds for a ray that meets it in these media.
+uint bounded_medium(Media media, Surface surface, bool front) {
+    uint medium = medium_of(surface);
+    return front ? medium : left_medium(media, medium);
+}
+
+#endif

@@ -1,3 +1,6 @@
+#ifndef COMMON_SAMPLING
+#define COMMON_SAMPLING
+
 const float PI = 3.14159265358979;
 
 // An orthonormal basis around the unit vector n: Duff and others, «Building an Orthonormal Basis, Revisited», 2017.
@@ -12,12 +15,11 @@ mat3 basis(vec3 n) {
 // Tools 2(3), 1997. A small square of numbers stays compact.
 vec2 disc_point(vec2 u) {
     vec2 p = 2.0 * u - 1.0;
-    if (p.x == 0.0 && p.y == 0.0) {
-        return vec2(0.0);
-    }
     bool wide = abs(p.x) > abs(p.y);
     float radius = wide ? p.x : p.y;
-    float phi = wide ? 0.25 * PI * (p.y / p.x) : 0.5 * PI - 0.25 * PI * (p.x / p.y);
+    float other = wide ? p.y : p.x;
+    float turn = 0.25 * PI * (other / (radius == 0.0 ? 1.0 : radius));
+    float phi = wide ? turn : 0.5 * PI - turn;
     return radius * vec2(cos(phi), sin(phi));
 }
 
@@ -69,3 +71,5 @@ vec3 decode_direction(uint code) {
 float largest(vec3 v) {
     return max(v.x, max(v.y, v.z));
 }
+
+#endif

@@ -21,7 +21,7 @@ uvec4 pcg4d(uvec4 v) {
 // Where numbers come from, see config::Sampler.
 layout(constant_id = 5) const uint SAMPLER = 0u;
 
-#include "sobol.glsl"
+#include "common/sobol.glsl"
 
 // What a path draws its numbers from.
 struct Random {

@@ -1,0 +1,172 @@
+// A base under a boundary of microfacets, as glTF 2.0, appendix B, has it, with Schlick's Fresnel; and how visible points carry it
+// to whatever gathers for them. v and l are unit vectors to the viewer and to the light.
+#ifndef BSDF_REFLECTION
+#define BSDF_REFLECTION
+
+#include "bsdf/fresnel.glsl"
+#include "bsdf/microfacet.glsl"
+#include "bsdf/material_features.glsl"
+
+struct Bsdf {
+    vec3 diffuse;   // albedo of the base
+    vec3 f0;        // reflectance of the boundary at normal and at grazing incidence
+    float f90;
+    float alpha;
+    vec2 over_base; // largest channel of what reflects over the base, at normal and at grazing incidence
+    float coat;     // what lies above both, see KHR_materials_clearcoat: how much of a dielectric's reflection it has
+};
+
+Bsdf lambertian(vec3 albedo) {
+    return Bsdf(albedo, vec3(0.0), 0.0, 0.0, vec2(0.0), 0.0);
+}
+
+vec3 fresnel(Bsdf bsdf, float cosine) {
+    return bsdf.f0 + (bsdf.f90 - bsdf.f0) * schlick(cosine);
+}
+
+// What gets through to the base, alike for all colours (KHR_materials_specular), and past what isn't metal alone.
+float through_to_base(Bsdf bsdf, float cosine) {
+    return 1.0 - mix(bsdf.over_base.x, bsdf.over_base.y, schlick(cosine));
+}
+
+// Its value, 1/sr, without what a smooth boundary mirrors.
+vec3 evaluate_bsdf(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
+    float nv = dot(n, v);
+    float nl = dot(n, l);
+    vec3 h = normalize(v + l);
+    float cosine = dot(v, h);
+    vec3 f = fresnel(bsdf, cosine);
+    float through = through_to_base(bsdf, cosine);
+    float alpha = max(bsdf.alpha, SMOOTH_ALPHA);
+    float visibility = 0.5 / (nl * masking_root(alpha, nv) + nv * masking_root(alpha, nl));
+    float lobe = bsdf.alpha < SMOOTH_ALPHA ? 0.0 : ggx(alpha, n, h) * visibility;
+    vec3 value = through * bsdf.diffuse * (1.0 / PI) + f * lobe;
+    return nv > 0.0 && nl > 0.0 ? coat_passes(bsdf.coat, cosine) * value : vec3(0.0);
+}
+
+// Share of the samples that go to the boundary's reflection: at least a quarter, for what it mirrors may be bright.
+float reflection_probability(Bsdf bsdf, float nv) {
+    vec3 f = fresnel(bsdf, nv);
+    float reflected = max(f.r, max(f.g, f.b));
+    float under = max(bsdf.diffuse.r, max(bsdf.diffuse.g, bsdf.diffuse.b)) * (1.0 - reflected);
+    return reflected <= 0.0 ? 0.0 : (under <= 0.0 ? 1.0 : max(reflected / (reflected + under), 0.25));
+}
+
+// BRDF · cos / density of a direction from `reflected_direction`, or of a mirror's.
+vec3 reflected_weight(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
+    float nv = dot(n, v);
+    float nl = dot(n, l);
+    bool smooth_boundary = bsdf.alpha < SMOOTH_ALPHA;
+    float vh = smooth_boundary ? nv : dot(v, normalize(v + l));
+    float masking = smooth_boundary ? 1.0 : (nl > 0.0 ? joint_masking(bsdf.alpha, nv, nl) : 0.0);
+    return fresnel(bsdf, vh) * (coat_passes(bsdf.coat, vh) * masking);
+}
+
+// The reflection of a boundary that paths follow has been taken away from what a visible point shows.
+Bsdf base_of(Bsdf bsdf) {
+    bsdf.alpha = 0.0;
+    return bsdf;
+}
+
+// Whether it scatters anything that isn't followed.
+bool scatters(Bsdf bsdf) {
+    return largest(bsdf.diffuse) > 0.0 || bsdf.alpha > 0.0;
+}
+
+// A visible point's BSDF, towards its viewer. Where nothing but Lambertian surfaces is known its value is 1, since the visible
+// point's weight has it.
+struct VisibleBsdf {
+    vec3 normal;
+    vec3 viewer;
+    Bsdf bsdf;
+    bool coated; // photons have their flux across their rays, since each layer has a normal of its own
+};
+
+VisibleBsdf no_visible_bsdf() {
+    return VisibleBsdf(vec3(0.0), vec3(0.0), lambertian(vec3(0.0)), false);
+}
+
+// Whether visible points carry one.
+bool carries_bsdf() {
+    return GLOSSY;
+}
+
+// The part of a visible point's weight that it has.
+vec3 weight_of(Bsdf bsdf) {
+    vec3 weight = bsdf.diffuse / PI;
+    if (GLOSSY) {
+        weight = vec3(1.0);
+    }
+    return weight;
+}
+
+Gloss pack_bsdf(Bsdf bsdf, vec3 viewer, bool coated) {
+    return Gloss(vec4(bsdf.diffuse, uintBitsToFloat(encode_direction(viewer))),
+                 uvec4(packHalf2x16(bsdf.f0.rg), packHalf2x16(vec2(bsdf.f0.b, bsdf.f90)),
+                       packHalf2x16(vec2(bsdf.alpha, bsdf.coat)) | (coated ? COATED : 0u), packHalf2x16(bsdf.over_base)));
+}
+
+VisibleBsdf unpack_bsdf(Gloss packed, vec3 normal) {
+    vec2 f0_b_f90 = unpackHalf2x16(packed.rest.y);
+    vec2 alpha_coat = unpackHalf2x16(packed.rest.z);
+    Bsdf bsdf = Bsdf(packed.diffuse_viewer.rgb, vec3(unpackHalf2x16(packed.rest.x), f0_b_f90.x), f0_b_f90.y,
+                     abs(alpha_coat.x), unpackHalf2x16(packed.rest.w), alpha_coat.y);
+    return VisibleBsdf(normal, decode_direction(floatBitsToUint(packed.diffuse_viewer.w)), bsdf,
+                       (packed.rest.z & COATED) != 0u);
+}
+
+vec3 evaluate_bsdf(VisibleBsdf visible, vec3 l) {
+    vec3 value = vec3(1.0);
+    if (GLOSSY) {
+        value = evaluate_bsdf(visible.bsdf, visible.normal, visible.viewer, l);
+    }
+    return value;
+}
+
+// The part of a photon's flux that is scattered to the viewer, 1/sr. Its direction is coded; a photon that doesn't count may have
+// none.
+vec3 gathered_part(VisibleBsdf visible, uint direction) {
+    vec3 part = vec3(1.0);
+    if (GLOSSY) {
+        vec3 l = -decode_direction(direction);
+        float cosine = visible.coated ? max(dot(visible.normal, l), 0.0) : 1.0;
+        part = cosine * evaluate_bsdf(visible, l);
+    }
+    return part;
+}
+
+// Whether it has a reflection that may be too narrow for points of lights to find it.
+bool has_narrow_lobe(VisibleBsdf visible) {
+    return GLOSSY && visible.bsdf.alpha > 0.0;
+}
+
+float probability_of_lobe(VisibleBsdf visible) {
+    float probability = 0.0;
+    if (has_narrow_lobe(visible)) {
+        probability = reflection_probability(visible.bsdf, dot(visible.normal, visible.viewer));
+    }
+    return probability;
+}
+
+// A direction to where light may come from: u.x chooses among the lobes.
+vec3 sample_bsdf(VisibleBsdf visible, vec3 u) {
+    vec3 l = cosine_direction(visible.normal, u.yz);
+    if (GLOSSY) {
+        if (u.x < probability_of_lobe(visible)) {
+            l = reflected_direction(visible.bsdf.alpha, visible.normal, visible.viewer, u.yz);
+        }
+    }
+    return l;
+}
+
+// The density by which `sample_bsdf` has chosen it, per solid angle.
+float bsdf_density(VisibleBsdf visible, vec3 l) {
+    float density = dot(l, visible.normal) / PI;
+    if (has_narrow_lobe(visible)) {
+        float of_lobe = reflected_density(visible.bsdf.alpha, visible.normal, visible.viewer, l);
+        density = mix(density, of_lobe, probability_of_lobe(visible));
+    }
+    return density;
+}
+
+#endif

@@ -1,0 +1,48 @@
+// What photon paths are aimed at, at their start and where they bounce.
+#ifndef LIGHTS_AIM
+#define LIGHTS_AIM
+
+// Paths are aimed at what was found to be worth it, or start in proportion to the lights' power.
+layout(constant_id = 24) const bool AIMED = false;
+
+#include "lights/emission_table.glsl"
+
+// The cone in which a sphere is seen.
+struct Cone {
+    vec3 axis;
+    float versine; // 1 − cos of the angle between its sides and the axis; 2 from inside the sphere
+};
+
+Cone cone_of(vec4 sphere, vec3 from) {
+    vec3 way = sphere.xyz - from;
+    float distance2 = dot(way, way);
+    float sin2 = sphere.w * sphere.w / distance2;
+    bool inside = distance2 <= sphere.w * sphere.w;
+    float versine = sin2 / (1.0 + sqrt(max(0.0, 1.0 - sin2)));
+    return Cone(inside ? vec3(0.0, 0.0, 1.0) : way * inversesqrt(distance2), inside ? 2.0 : versine);
+}
+
+// From a matte surface outside of what the camera sees hardly a photon finds there, and those that do carry the flux of all:
+// half of them are aimed there. Gives the direction in place of the cosine's, and what the flux is to be weighed with: cosine
+// over the density of both ways together, at most 2.
+float guide(vec3 position, vec3 normal, vec4 u, inout vec3 outgoing) {
+    EmissionTableSize size = emission_table_size();
+    float weight = 1.0;
+    if (size.view < size.targets) {
+        vec4 sphere = target_sphere(size.view);
+        vec3 way = sphere.xyz - position;
+        if (sphere.w * sphere.w < NARROW_CONE * dot(way, way) && dot(way, normal) > -sphere.w) {
+            Cone cone = cone_of(sphere, position);
+            bool aimed = u.w < 0.5;
+            outgoing = aimed ? direction_in_cone(cone.axis, cone.versine, u.xy) : outgoing;
+            vec3 off = outgoing - cone.axis;
+            bool inside = aimed || 0.5 * dot(off, off) <= cone.versine;
+            float by_cosine = max(0.0, dot(outgoing, normal)) / PI;
+            float by_aim = inside ? 1.0 / (2.0 * PI * cone.versine) : 0.0;
+            weight = by_cosine > 0.0 ? 2.0 * by_cosine / (by_cosine + by_aim) : 0.0;
+        }
+    }
+    return weight;
+}
+
+#endif

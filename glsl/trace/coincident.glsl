@@ -1,0 +1,194 @@
+// Faces in one place. Rounding decides which of them a ray meets first, and the step off the one takes it past the others: all
+// that are no further apart are met at once. What is opaque is met before glass that lies on it, what shines or looks to the ray
+// before what doesn't. Include after common/random.glsl.
+#ifndef TRACE_COINCIDENT
+#define TRACE_COINCIDENT
+
+#include "trace/media.glsl"
+#include "trace/opacity.glsl"
+
+layout(constant_id = 8) const bool CONTACT = true;
+layout(constant_id = 23) const bool CULLING = false;
+
+// What lies in the place where a ray meets matter.
+struct Interface {
+    Hit hit;       // of the face that it meets
+    vec3 reach;    // of the faces, see Surface
+    float opacity; // chance of meeting it, where something isn't there everywhere
+    bool is_flat;  // a solid dielectric without thickness
+    vec3 tint;     // of the other boundaries of dielectrics there
+    Media through; // that the ray came through
+    Media beyond;  // behind boundaries of dielectrics
+};
+
+Interface interface_of(Hit hit, Media media) {
+    return Interface(hit, vec3(0.0), 1.0, false, vec3(1.0), media, media);
+}
+
+// As the ray crosses a boundary of a medium.
+void cross_boundary(inout Interface place, uint medium, bool front) {
+    if (front) {
+        if (NESTED) {
+            place.through = without(place.through, medium);
+        }
+        place.beyond = with(place.beyond, medium);
+    } else {
+        place.through = with(place.through, medium);
+        place.beyond = without(place.beyond, medium);
+    }
+}
+
+// Of faces in one place that are no dielectrics', the highest is met.
+uint preference(Surface surface, Material material, vec3 incoming) {
+    bool front = dot(incoming, surface.geometric_normal) < 0.0;
+    bool shines = largest(material.emission) > 0.0 && emits(material, front);
+    bool see_through = (surface.flags & SEE_THROUGH) != 0u;
+    uint kind = (shines ? 8u : 0u) | (front ? 4u : 0u) | (hides_back(material) ? 0u : 2u) | (see_through ? 1u : 0u);
+    return kind << 28u | min(surface.object + 1u, 0xfffffffu);
+}
+
+// Whether it is a back that no camera sees.
+bool is_hidden_back(Surface surface, Material material, vec3 incoming) {
+    return CULLING && hides_back(material) && dot(incoming, surface.geometric_normal) > 0.0;
+}
+
+// Whether other faces may lie where a triangle is met.
+bool may_coincide(Surface surface, bool front) {
+    bool touched = CONTACT && (surface.flags & TOUCHED) != 0u;
+    bool coincides = COINCIDENCE && ((surface.flags & COINCIDENT) != 0u || (!front && (surface.flags & BACKED) != 0u));
+    return touched || coincides;
+}
+
+// What is known of the place while its faces are looked for.
+struct Search {
+    Interface place;
+    uint preferred;      // of the opaque face that is met
+    uint missing;        // most preferred of those that aren't there
+    float share_missing; // its opacity
+    uint solid;          // the lowest of the other solids
+};
+
+void keep_search(Search search) {
+    Interface place = search.place;
+    keep(0u, place.reach);
+    keep(3u, place.tint);
+    keep(6u, vec3(place.hit.u, place.hit.v, place.opacity));
+    keep(9u, uvec4(place.hit.triangle, place.hit.instance, search.preferred, search.missing));
+    keep(13u, vec3(search.share_missing, uintBitsToFloat(search.solid), place.is_flat ? 1.0 : 0.0));
+    keep_media(16u, place.through);
+    keep_media(20u, place.beyond);
+}
+
+Search kept_search() {
+    vec3 at = kept(6u);
+    uvec4 bits = kept_bits(9u);
+    vec3 more = kept(13u);
+    Hit hit = hit_at(PlacedTriangle(bits.x, bits.y), at.xy);
+    Interface place = Interface(hit, kept(0u), at.z, more.z != 0.0, kept(3u), kept_media(16u), kept_media(20u));
+    return Search(place, bits.z, bits.w, more.x, floatBitsToUint(more.y));
+}
+
+// Takes another face of the place into account, which is there.
+void meet_face(inout Search search, inout bool opaque, Hit hit, Surface face, Material material, bool doubles, float share,
+               vec3 incoming, Media media) {
+    bool glass = is_dielectric(material);
+    uint preference_of_face = preference(face, material, incoming);
+    if (!glass && preference_of_face > search.preferred) {
+        search.preferred = preference_of_face;
+        search.place.hit = hit;
+        search.place.opacity = share;
+        opaque = true;
+    } else if (is_solid(material) && !opaque) {
+        search.place.is_flat = search.place.is_flat || doubles;
+        if (!doubles) {
+            bool front = dot(incoming, face.geometric_normal) < 0.0;
+            uint bounded = bounded_medium(media, face, front);
+            cross_boundary(search.place, bounded, front);
+            search.place.tint *= material.base_color;
+            if (bounded < search.solid) {
+                search.place.hit = hit;
+            }
+            search.solid = min(search.solid, bounded);
+        }
+    }
+}
+
+// media: those that the ray is in, as far as its path knows. With `culls` backs that no camera sees aren't there.
+Interface coincident_interfaces(Hit hit, vec3 incoming, Media media, bool culls, Random random) {
+    Search search = Search(interface_of(hit, media), 0u, 0u, 0.0, VACUUM);
+    search.place.opacity = opacity(hit);
+    Surface first = surface_at(hit);
+    search.place.reach = first.reach;
+    Material material = material_at(first.material);
+    bool front = dot(incoming, first.geometric_normal) < 0.0;
+    bool opaque = !is_dielectric(material) && !(culls && is_hidden_back(first, material, incoming));
+    bool solid = is_solid(material);
+    if (solid) {
+        cross_boundary(search.place, bounded_medium(media, first, front), front);
+    }
+    if (may_coincide(first, front)) {
+        search.preferred = opaque ? preference(first, material, incoming) : 0u;
+        keep_search(search);
+        keep(24u, first.position);
+        keep(27u, first.geometric_normal);
+        keep(30u, first.reach);
+        lane_memory[STACK_SIZE + 33u] = first.object;
+        Progress progress = AT_ORIGIN;
+        bool goes_on = true;
+        while (goes_on) {
+            // What lies there may be larger and so less certain.
+            vec3 of_first = kept(30u);
+            float probe = ROUNDINGS * max(of_first.x + of_first.y + of_first.z, 1.0);
+            vec3 across = probe * kept(27u);
+            Hit other_hit = trace_from(kept(24u) + across, -2.0 * across, progress, 1.0, triangle_of(hit), false);
+            goes_on = other_hit.triangle != MISS && !loops_cut;
+            if (goes_on) {
+                progress = past(other_hit);
+                Surface other = surface_at(other_hit);
+                Material other_material = material_at(other.material);
+                vec3 n = kept(27u);
+                vec3 reach = max(other.reach, kept(30u));
+                bool apart = abs(dot(other.position - kept(24u), n)) > ROUNDINGS * dot(abs(n), reach);
+                bool same_object = other.object == lane_memory[STACK_SIZE + 33u];
+                bool doubles = same_object && dot(other.geometric_normal, n) < -PARALLEL;
+                bool hidden = culls && is_hidden_back(other, other_material, incoming);
+                if (!apart && (!same_object || doubles) && !hidden) {
+                    float share = opacity(other_hit);
+                    search = kept_search();
+                    if (of_face(random, triangle_of(other_hit)) < share) {
+                        search.place.reach = max(search.place.reach, reach);
+                        meet_face(search, opaque, other_hit, other, other_material, doubles, share, incoming, media);
+                    } else {
+                        uint preference_of_other = preference(other, other_material, incoming);
+                        bool most = preference_of_other > search.missing;
+                        search.share_missing = most ? share : search.share_missing;
+                        search.missing = most ? preference_of_other : search.missing;
+                    }
+                    keep_search(search);
+                }
+            }
+        }
+        search = kept_search();
+        search.place.opacity *= search.missing > search.preferred ? 1.0 - search.share_missing : 1.0;
+        if (opaque) {
+            search.place.is_flat = false;
+            search.place.tint = vec3(1.0);
+        } else if (search.place.is_flat) {
+            search.place.hit = hit;
+            search.place.through = media;
+            search.place.beyond = media;
+        } else if (search.solid != VACUUM) {
+            // The boundary is that of what is there on either side.
+            Surface surface = surface_at(hit);
+            uint own = bounded_medium(media, surface, dot(incoming, surface.geometric_normal) < 0.0);
+            if (solid && (own == search.place.through.first || own == search.place.beyond.first)) {
+                search.place.hit = hit;
+            } else {
+                search.place.tint = material_at(surface.material).base_color;
+            }
+        }
+    }
+    return search.place;
+}
+
+#endif

@@ -1,0 +1,48 @@
+// Rays past surfaces that aren't there everywhere. Include after common/random.glsl.
+#ifndef TRACE_OPACITY
+#define TRACE_OPACITY
+
+#include "bsdf/material.glsl"
+#include "trace/intersect.glsl"
+
+layout(constant_id = 17) const bool ALPHA = false;
+
+bool is_see_through(uint flags) {
+    return ALPHA && (flags & SEE_THROUGH) != 0u;
+}
+
+// The chance that a ray finds a surface there.
+float opacity(Hit hit) {
+    float there = 1.0;
+    if (is_see_through(shading_triangle(hit.triangle).flags)) {
+        there = opacity_at(hit);
+    }
+    return there;
+}
+
+// Decides whether a ray finds a face there that isn't there everywhere: a pure function of the ray's place in its path.
+float of_face(Random random, PlacedTriangle at) {
+    return number_of(random, uvec2(at.triangle, at.instance + 1u));
+}
+
+// As `trace_from`, by chance through what is there in part.
+Hit trace_visible(vec3 origin, vec3 direction, Progress progress, float t_max, PlacedTriangle ignored, bool any,
+                  Random random) {
+    Hit hit = NO_HIT;
+    if (ALPHA) {
+        bool goes_on = true;
+        while (goes_on) {
+            hit = trace_from(origin, direction, progress, t_max, ignored, false);
+            goes_on = hit.triangle != MISS && !loops_cut;
+            if (goes_on) {
+                goes_on = of_face(random, triangle_of(hit)) >= opacity(hit);
+                progress = past(hit);
+            }
+        }
+    } else {
+        hit = trace_from(origin, direction, progress, t_max, ignored, any);
+    }
+    return hit;
+}
+
+#endif
