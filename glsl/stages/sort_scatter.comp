@@ -5,8 +5,8 @@
 
 layout(local_size_x = 128) in;
 
-#include "invocation.glsl"
-#include "sort.glsl"
+#include "common/invocation.glsl"
+#include "common/sort.glsl"
 
 layout(std430) readonly buffer KeysIn { uint keys_in[]; };
 layout(std430) readonly buffer ValuesIn { uint values_in[]; };
@@ -14,56 +14,68 @@ layout(std430) readonly buffer Histograms { uint histograms[]; };
 layout(std430) writeonly buffer KeysOut { uint keys_out[]; };
 layout(std430) writeonly buffer ValuesOut { uint values_out[]; };
 
-#include "workgroup_scan.glsl"
+#include "common/workgroup_scan.glsl"
 
 const uint PER_THREAD = SORT_TILE / gl_WorkGroupSize.x;
-const uint HALF = 8u; // of the values of four bits
+const uint QUADS = 4u;      // of the values of four bits
+const uint GROUP_SIZE = 8u; // threads: their items of a value fit a byte
+const uint GROUPS = gl_WorkGroupSize.x / GROUP_SIZE;
 
 // Digits above, and below them the keys' places in the tile.
 const uint DIGIT_SHIFT = 16u;
+const uint COUNT_SHIFT = 28u;
 shared uint items[SORT_TILE];
-// [value of four bits][thread]: first how many, then where the thread's next one goes; 16 bits each, those of the values from 8 on
-// above those of the first eight. With 32 bits each, more shared memory would be taken than every device has.
-shared uint counts[HALF * gl_WorkGroupSize.x];
-// Where each digit's keys begin among all, less where they begin in the tile.
-shared uint places[MOST_DIGITS];
+// [quad][thread], a byte for each value: first how many items the thread has, then how many those before it in its group have. With
+// more than a byte each, shared memory would bound how many workgroups a GPU can hold. After the
+// sort it is [digit], see `find_places`.
+shared uint counts[QUADS * gl_WorkGroupSize.x];
+shared uint of_groups[QUADS * GROUPS];   // [quad][group], likewise: how many the group has
+shared uint starts[QUADS * 2u * GROUPS]; // [value][group], 16 bits each: where its first item goes
+
+uint byte_of(uint word, uint i) {
+    return word >> i * 8u & 0xffu;
+}
 
 // Sorts the tile by four bits. Each thread has a run of it, one item after the other, which keeps the order of equal ones.
 void split(uint mine[PER_THREAD], uint shift) {
     uint me = gl_LocalInvocationID.x;
+    uint group = me / GROUP_SIZE;
     uvec4 count = uvec4(0u); // of the thread's own ones, a byte for each value: registers take less time than shared memory
-    uint before_mine[PER_THREAD];
     for (uint i = 0u; i < PER_THREAD; i++) {
         uint value = bitfieldExtract(mine[i], int(shift), 4);
-        uint byte_shift = value % 4u * 8u;
         uvec4 here = uvec4(equal(uvec4(value / 4u), uvec4(0u, 1u, 2u, 3u)));
         uvec4 counted = count * here;
-        before_mine[i] = (counted.x | counted.y | counted.z | counted.w) >> byte_shift & 0xffu;
-        count += here << byte_shift;
+        // How many of its items have come before goes above the digit: in registers of its own it would take as many again.
+        mine[i] |= byte_of(counted.x | counted.y | counted.z | counted.w, value % 4u) << COUNT_SHIFT;
+        count += here << value % 4u * 8u;
     }
-    for (uint i = 0u; i < HALF; i++) {
-        uint low = count[i / 4u] >> i % 4u * 8u & 0xffu;
-        uint high = count[i / 4u + 2u] >> i % 4u * 8u & 0xffu;
-        counts[i * gl_WorkGroupSize.x + me] = high << 16u | low;
+    for (uint i = 0u; i < QUADS; i++) {
+        counts[i * gl_WorkGroupSize.x + me] = count[i];
     }
     barrier();
-    uint sum = 0u;
-    for (uint i = 0u; i < HALF; i++) {
-        sum += counts[me * HALF + i];
+    if (me < QUADS * GROUPS) {
+        uint sum = 0u;
+        for (uint i = 0u; i < GROUP_SIZE; i++) {
+            uint of_thread = counts[me * GROUP_SIZE + i];
+            counts[me * GROUP_SIZE + i] = sum;
+            sum += of_thread;
+        }
+        of_groups[me] = sum;
     }
+    barrier();
+    // Two groups of a value for each thread.
+    uint value_of_sum = 2u * me / GROUPS;
+    uint first = value_of_sum / 4u * GROUPS + 2u * me % GROUPS;
+    uint of_first = byte_of(of_groups[first], value_of_sum % 4u);
     uint total;
-    uint before = workgroup_exclusive_scan(sum, total);
-    before += total << 16u; // the upper half begins where the lower one ends
-    for (uint i = 0u; i < HALF; i++) {
-        uint count = counts[me * HALF + i];
-        counts[me * HALF + i] = before;
-        before += count;
-    }
+    uint before = workgroup_exclusive_scan(of_first + byte_of(of_groups[first + 1u], value_of_sum % 4u), total);
+    starts[me] = before + of_first << 16u | before;
     barrier();
     for (uint i = 0u; i < PER_THREAD; i++) {
         uint value = bitfieldExtract(mine[i], int(shift), 4);
-        uint at = value % HALF * gl_WorkGroupSize.x + me;
-        items[(counts[at] >> value / HALF * 16u & 0xffffu) + before_mine[i]] = mine[i];
+        uint start = starts[(value * GROUPS + group) / 2u] >> group % 2u * 16u & 0xffffu;
+        uint in_group = byte_of(counts[value / 4u * gl_WorkGroupSize.x + me], value % 4u);
+        items[start + in_group + (mine[i] >> COUNT_SHIFT)] = mine[i] & (1u << COUNT_SHIFT) - 1u;
     }
     barrier();
 }
@@ -77,8 +89,8 @@ void find_places() {
     uint total;
     uint before = workgroup_exclusive_scan(first + second, total);
     if (has) {
-        places[digit] = before + histograms[histogram_of(digit, workgroup_index())];
-        places[digit + 1u] = before + first + histograms[histogram_of(digit + 1u, workgroup_index())];
+        counts[digit] = before + histograms[histogram_of(digit, workgroup_index())];
+        counts[digit + 1u] = before + first + histograms[histogram_of(digit + 1u, workgroup_index())];
     }
 }
 
@@ -90,7 +102,6 @@ void main() {
         return;
     }
     uint keys = min(SORT_TILE, sort_count - tile);
-    find_places();
     uint mine[PER_THREAD];
     for (uint i = 0u; i < PER_THREAD; i++) {
         uint place = me * PER_THREAD + i;
@@ -105,12 +116,14 @@ void main() {
         }
         split(mine, DIGIT_SHIFT + 4u);
     }
+    find_places();
+    barrier();
     for (uint i = 0u; i < PER_THREAD; i++) {
         uint place = i * gl_WorkGroupSize.x + me;
         mine[i] = items[place];
         uint digit = mine[i] >> DIGIT_SHIFT;
         if (place == 0u || items[place - 1u] >> DIGIT_SHIFT != digit) {
-            places[digit] -= place;
+            counts[digit] -= place; // less where they begin in the tile
         }
     }
     barrier();
@@ -118,7 +131,7 @@ void main() {
         uint place = i * gl_WorkGroupSize.x + me;
         if (place < keys) {
             uint from = tile + (mine[i] & (1u << DIGIT_SHIFT) - 1u);
-            uint to = places[mine[i] >> DIGIT_SHIFT] + place;
+            uint to = counts[mine[i] >> DIGIT_SHIFT] + place;
             keys_out[to] = keys_in[from];
             values_out[to] = values_in[from];
         }
