@@ -1,4 +1,4 @@
-//! Compiles `glsl/stages/*.comp` to SPIR-V, reflects what each stage binds, and writes the `shaders` module. What host and
+//! Compiles `glsl/stages/*.comp`, and `glsl/probes/*.comp` for tests, to SPIR-V, reflects what each stage binds, and writes the `shaders` module. What host and
 //! kernels share, `layout.glsl` and `settings.glsl`, is generated.
 //!
 //! A block's name in GLSL is its buffer's name in [`BufferId`](src/stage.rs): a name without a variant of that enum
@@ -26,9 +26,12 @@ fn main() -> Result<()> {
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
     let out = PathBuf::from(env::var("OUT_DIR")?);
 
-    let mut sources: Vec<PathBuf> = fs::read_dir(root.join("glsl/stages"))?
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<std::io::Result<_>>()?;
+    let mut sources = Vec::new();
+    for folder in ["glsl/stages", "glsl/probes"] {
+        for entry in fs::read_dir(root.join(folder))? {
+            sources.push(entry?.path());
+        }
+    }
     sources.retain(|path| path.extension().is_some_and(|extension| extension == "comp"));
     sources.sort();
 

@@ -8,8 +8,8 @@
 //! photons, `direct` samples the lights, `update` shrinks the radii (the paper's equations 2 and 3). `resolve` makes the
 //! picture (equation 4), and [`film`] writes it.
 //!
-//! [`record::Recording`] turns stages into commands with barriers; [`gpu`] alone knows Vulkan. [`cpu`] has each stage as
-//! a plain function. ARCHITECTURE.md walks through the rest.
+//! [`record::Recording`] turns stages into commands with barriers; [`gpu`] alone knows Vulkan. [`cpu`] is a plain renderer in
+//! f64, made of the functions that kernels are tested against. ARCHITECTURE.md walks through the rest.
 
 #![warn(missing_docs)]
 

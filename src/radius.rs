@@ -250,7 +250,7 @@ fn nearest(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::pcg4d;
+    use crate::random::pcg4d;
 
     /// Numbers in [0, 1), the same in every run.
     fn random(index: u32) -> [f32; 4] {

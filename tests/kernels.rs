@@ -1,4 +1,4 @@
-//! The kernels against the CPU's stages (`src/cpu`), on the best Vulkan device of the machine. In debug builds a message
+//! The kernels against the CPU's functions (`src/cpu`), on the best Vulkan device of the machine. In debug builds a message
 //! of the validation layer fails a test as well.
 
 #[path = "kernels/agreement.rs"]
@@ -23,6 +23,8 @@ mod photons;
 mod pictures;
 #[path = "kernels/primitives.rs"]
 mod primitives;
+#[path = "kernels/probes.rs"]
+mod probes;
 #[path = "kernels/rays.rs"]
 mod rays;
 #[path = "kernels/statistics.rs"]

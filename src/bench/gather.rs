@@ -2,21 +2,20 @@
 
 use std::time::Instant;
 
-use bytemuck::Zeroable;
 use serde::Serialize;
 
 use super::median;
 use super::structure::{Structure, structure};
 use crate::backend::{Backend, DeviceDescription};
-use crate::config::{RenderConfig, Totals};
-use crate::cpu::{self, Counts, Inputs};
-use crate::emission::Aim;
+use crate::config::RenderConfig;
+use crate::cpu::{self, SeenByKernels};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, Tests, is_gather_stage};
 use crate::gpu::Device;
-use crate::layout::{GATHERED_FOR, GROUP, Gathered, NO_OBJECT, Photon, Settings, VisiblePoint};
+use crate::layout::{GATHERED_FOR, GROUP, Gathered, NO_OBJECT, Photon, VisiblePoint};
 use crate::packing::PackedScene;
 use crate::pipeline::Renderer;
+use crate::random::CameraTurn;
 use crate::record::Run;
 use crate::scene::Camera;
 use crate::sizes::{Probe, Sizes};
@@ -126,6 +125,16 @@ struct Input {
     expected: Vec<u32>,
 }
 
+impl Input {
+    fn seen(&self) -> SeenByKernels<'_> {
+        SeenByKernels {
+            points: &self.points,
+            gloss: &[],
+            radii2: &self.radii2,
+        }
+    }
+}
+
 impl GatherBench<'_> {
     /// Runs the bench; `note` hears what it is doing.
     ///
@@ -182,7 +191,7 @@ impl GatherBench<'_> {
         }
         let mut steps = self.device_steps(renderer)?;
         let input = input(renderer)?;
-        self.cpu_steps(renderer, resolution, &mut steps)?;
+        self.cpu_steps(resolution, &mut steps)?;
         let visible_points = input.points.iter().filter(|point| object(point) != NO_OBJECT).count();
 
         let mut methods = Vec::new();
@@ -229,47 +238,20 @@ impl GatherBench<'_> {
         })
     }
 
-    fn cpu_steps(&self, renderer: &mut Renderer, resolution: [u32; 2], steps: &mut StepTimes) -> Result<()> {
-        let settings: Vec<Settings> = renderer.gpu().download(BufferId::Settings, Some(1))?;
-        let statistics = renderer.gpu().download(BufferId::StatisticsOf, None)?;
-        let points: Vec<VisiblePoint> = renderer.gpu().download(BufferId::VisiblePoints, None)?;
-        let direct = renderer.gpu().download(BufferId::DirectSums, None)?;
-        let coverage = renderer.gpu().download(BufferId::CoverageOf, None)?;
+    /// The same steps by the plain renderer.
+    fn cpu_steps(&self, resolution: [u32; 2], steps: &mut StepTimes) -> Result<()> {
         let config = RenderConfig {
             resolution,
+            gather: None,
             ..self.config.clone()
         };
-        let inputs = Inputs {
-            scene: self.scene,
-            settings: &settings[0],
-            config: &config,
-            demand: None,
-            emission: renderer.aim().map(Aim::table),
-        };
-        let counts = Counts::default();
-        let batch = cpu::Batch {
-            iteration: 0,
-            first_path: 0,
-            paths: config.photons,
-        };
+        let photons = config.photons;
+        let mut plain = cpu::Renderer::new(self.scene, self.camera, config)?;
         // One more, to warm up.
-        let median_of = |work: &dyn Fn() -> f64| median((0..=self.repeats).map(|_| work()).skip(1).collect());
-        steps.raytracing_us[1] = median_of(&|| timed_us(|| cpu::camera(&inputs, cpu::CameraTurn::FIRST, &counts)).1);
-        steps.photon_tracing_us[1] =
-            median_of(&|| timed_us(|| cpu::compact(&cpu::photons(&inputs, batch, &counts).lanes)).1);
-        steps.synthesize_us[1] = median_of(&|| {
-            timed_us(|| {
-                cpu::resolve(
-                    &settings[0],
-                    &points,
-                    &statistics,
-                    &direct,
-                    &coverage,
-                    Totals::default().at_least_one(),
-                )
-            })
-            .1
-        });
+        let median_of = |work: &mut dyn FnMut() -> f64| median((0..=self.repeats).map(|_| work()).skip(1).collect());
+        steps.raytracing_us[1] = median_of(&mut || timed_us(|| plain.trace_camera_paths(CameraTurn::FIRST)).1);
+        steps.photon_tracing_us[1] = median_of(&mut || timed_us(|| plain.trace_photon_paths(0, 0..photons)).1);
+        steps.synthesize_us[1] = median_of(&mut || timed_us(|| plain.resolve_all()).1);
         Ok(())
     }
 }
@@ -282,9 +264,8 @@ fn input(renderer: &mut Renderer) -> Result<Input> {
         photons: renderer.gpu().download(BufferId::Photons, Some(count[0] as usize))?,
         expected: Vec::new(),
     };
-    let mut gathered = vec![Gathered::zeroed(); input.radii2.len()];
-    cpu::gather_kd_tree(&input.points, &input.radii2, &input.photons, &mut gathered)?;
-    input.expected = gathered.iter().map(count_of).collect();
+    let gathered = cpu::gather_kd_tree(&input.seen(), &input.photons)?;
+    input.expected = gathered.iter().map(|gathered| gathered.count).collect();
     Ok(input)
 }
 
@@ -412,8 +393,12 @@ impl Measured {
         let points: Vec<VisiblePoint> = input.points.iter().copied().step_by(stride).collect();
         let maps = input.radii2.chunks(input.points.len());
         let radii2: Vec<f32> = maps.flat_map(|map| map.iter().copied().step_by(stride)).collect();
-        let mut gathered = vec![Gathered::zeroed(); radii2.len()];
-        timed_us(|| cpu::gather_naive(&points, &radii2, &input.photons, &mut gathered)).1
+        let seen = SeenByKernels {
+            points: &points,
+            gloss: &[],
+            radii2: &radii2,
+        };
+        timed_us(|| cpu::gather_naive(&seen, &input.photons)).1
     }
 
     fn repeat(&mut self, renderer: &mut Renderer, input: &Input) -> Result<()> {
@@ -421,9 +406,7 @@ impl Measured {
             Runs::Device { .. } => phases(&renderer.gather(self.method, self.probe)?.0),
             Runs::CpuNaive => [0.0, 0.0, self.cpu_naive(input, self.probe.stride as usize)],
             Runs::CpuKdTree => {
-                let mut gathered = vec![Gathered::zeroed(); input.radii2.len()];
-                let (found, us) =
-                    timed_us(|| cpu::gather_kd_tree(&input.points, &input.radii2, &input.photons, &mut gathered));
+                let (found, us) = timed_us(|| cpu::gather_kd_tree(&input.seen(), &input.photons));
                 found?;
                 [0.0, 0.0, us]
             }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::config::Sampler;
-use crate::cpu::{PathKind, Random};
+use crate::random::{PathKind, Random};
 
 /// Cells along each axis of the table of 2-, 3- and 4-tuples, as powers of two: some ten thousand cells in all.
 const DIGITS: [u32; 3] = [8, 5, 4];

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::cpu::pixel_of;
+use crate::config::pixel_of;
 use crate::error::Result;
 use crate::film::Image;
 use crate::layout::{GROUP, NO_SLOT, StatusCounters};

@@ -79,7 +79,7 @@ pub enum Bench {
 pub enum BackendChoice {
     /// A Vulkan device.
     Vulkan,
-    /// The processor, without Vulkan: the reference that the kernels are tested against.
+    /// The processor, without Vulkan: a plain renderer in f64, which the kernels are tested against.
     Cpu,
 }
 

@@ -77,11 +77,12 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
             f64::from(backend.radius()) / packed.scale
         );
     }
-    if config.emission == EmissionChoice::Aimed && !backend.aims() {
+    let on_device = backend_choice == BackendChoice::Vulkan;
+    if on_device && config.emission == EmissionChoice::Aimed && !backend.aims() {
         say!("photon paths start in proportion to the lights' power: aiming them isn't worth its cost in this scene");
     }
     let specular = features.mirror || features.dielectric;
-    if specular && config.estimator == Estimator::Sppm && backend.photon_maps() == 1 {
+    if on_device && specular && config.estimator == Estimator::Sppm && backend.photon_maps() == 1 {
         say!(
             "caustics have the radii of other light: at this --resolution a photon map of their own is larger than the device \
              binds"

@@ -1,66 +1,23 @@
-//! How much of the discs around visible points can have photons.
+//! Which points of the disc around a visible point can have photons, and whether anything is around it.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::intersect::{Progress, Ray, nearest_hit, nearest_hit_from};
-use super::sampling::{basis, cosine_direction, decode_direction, disc_point};
-use super::surface::{Surface, offset_origin, reach_of, surface_of};
+use super::sampling::{basis, cosine_direction, disc_point};
+use super::surface::{Surface, surface_of};
 use super::texture::share_there;
-use super::vector::{word, xyz};
 use super::{FAR, Inputs};
-use crate::layout::{
-    BACKED, COINCIDENT, COVERAGE_CROSSINGS, COVERAGE_TRUSTED, COVERAGE_WHOLE, Coverage, DIELECTRIC, Gathered, MATTE,
-    NO_OBJECT, SEE_THROUGH, Statistics, VisiblePoint,
-};
-use crate::random::Random;
+use crate::layout::{BACKED, COINCIDENT, COVERAGE_CROSSINGS, DIELECTRIC, MATTE, SEE_THROUGH};
 
-/// Asks points of the disc of radius R around each visible point, for each photon map: past the edge of the object, or inside
-/// an opaque one that stands on it, there are no photons. As long as a point has had no photon, a ray into its hemisphere says
-/// whether it lies in the open, where none has to come.
-pub fn coverage(
-    inputs: &Inputs<'_>,
-    iteration: u32,
-    visible_points: &[VisiblePoint],
-    radii2: &[f32],
-    (statistics, gathered): (&[Statistics], &[Gathered]),
-    coverage: &mut [Coverage],
-) {
-    let points = inputs.config.coverage_points(iteration);
-    let has_caustic_photons = |slot: usize| {
-        let caustic = statistics.get(visible_points.len() + slot);
-        caustic.is_some_and(|statistics| (statistics.accepted_low | statistics.accepted_high) != 0)
-    };
-    let receivers = coverage.par_iter_mut().zip(radii2).zip(statistics).zip(gathered);
-    receivers
-        .enumerate()
-        .for_each(|(index, (((coverage, &radius2), statistics), gathered))| {
-            let slot = index % visible_points.len();
-            let point = &visible_points[slot];
-            if word(point.position_object) == NO_OBJECT {
-                return;
-            }
-            // Without photons there is nothing to correct.
-            let photons = statistics.accepted_low | statistics.accepted_high | gathered.count;
-            let trusted = coverage.covered == coverage.asked && coverage.asked >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
-            let random = Random::of_disc(inputs.config, slot as u32, iteration, points);
-            if photons == 0 && index < visible_points.len() && coverage.surrounded == 0 && !has_caustic_photons(slot) {
-                let mut behind = random;
-                behind.skip_to(COVERAGE_WHOLE); // those of the disc
-                let [u, v, ..] = behind.next4();
-                coverage.surrounded = u32::from(is_surrounded(inputs, point, u, v));
-            }
-            if photons == 0 || (trusted && !(iteration as usize + slot / 64).is_multiple_of(8)) {
-                return;
-            }
-            let radius = f64::from(radius2).sqrt();
-            let covered = (0..points).filter(|&number| {
-                let [u, v, ..] = random.sample_of(number, points).next4();
-                can_have_photons(inputs, point, radius, [u, v])
-            });
-            coverage.covered += covered.count() as u32 * (COVERAGE_WHOLE / points);
-            coverage.asked += COVERAGE_WHOLE;
-        });
+/// A visible point as coverage is asked for there.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// Where rays leave it along [`Self::normal`].
+    pub origin: DVec3,
+    /// Geometric, on the side that is seen.
+    pub normal: DVec3,
+    /// Photons count on this object alone.
+    pub object: u32,
 }
 
 /// The side of an object that a ray meets.
@@ -79,11 +36,11 @@ impl Side {
     }
 }
 
-fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, [u, v]: [f64; 2]) -> bool {
-    let object = word(point.position_object);
-    let n = decode_direction(word(point.weight_normal));
-    let origin = offset_origin(xyz(point.position_object), n, reach_of(inputs.scene, object));
-    let along = basis(n) * (radius * disc_point(u, v)).extend(0.0);
+/// Whether the point of a disc that `u` chooses can have photons: not past the edge of the object, nor inside an opaque one that
+/// stands on it.
+pub fn can_have_photons(inputs: &Inputs<'_>, place: Place, radius: f64, u: [f64; 2]) -> bool {
+    let Place { origin, normal, object } = place;
+    let along = basis(normal) * (radius * disc_point(u[0], u[1])).extend(0.0);
     // Along the surface, into other objects and out of them again.
     let (mut entered, mut ignored, mut progress) = (None, None, Progress::AT_ORIGIN);
     let ray = Ray {
@@ -117,13 +74,13 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, [u, 
             left.object == entered.object && left.front != entered.front
         })
     };
-    if entered.is_some_and(|entered| leaves(along, entered) && leaves(n, entered)) {
+    if entered.is_some_and(|entered| leaves(along, entered) && leaves(normal, entered)) {
         return false;
     }
     // Then down: it may bend, but it must be there, under glass that lies on it and other faces in its place too.
     let down = Ray {
         origin: origin + along,
-        direction: -radius * n,
+        direction: -radius * normal,
     };
     let mut progress = Progress::AT_ORIGIN;
     for _ in 0..COVERAGE_CROSSINGS {
@@ -144,17 +101,15 @@ fn can_have_photons(inputs: &Inputs<'_>, point: &VisiblePoint, radius: f64, [u, 
 }
 
 /// Whether a ray meets something, past glass, that may scatter light or mirror it.
-fn is_surrounded(inputs: &Inputs<'_>, point: &VisiblePoint, u: f64, v: f64) -> bool {
-    let n = decode_direction(word(point.weight_normal));
-    let direction = cosine_direction(n, u, v);
-    let mut origin = offset_origin(
-        xyz(point.position_object),
-        n,
-        reach_of(inputs.scene, word(point.position_object)),
-    );
-    let mut ignored = None;
+pub fn is_surrounded(inputs: &Inputs<'_>, place: Place, u: [f64; 2]) -> bool {
+    let direction = cosine_direction(place.normal, u[0], u[1]);
+    let ray = Ray {
+        origin: place.origin,
+        direction,
+    };
+    let mut progress = Progress::AT_ORIGIN;
     for _ in 0..=COVERAGE_CROSSINGS {
-        let Some(hit) = nearest_hit(inputs, Ray { origin, direction }, FAR, ignored) else {
+        let Some(hit) = nearest_hit_from(inputs, ray, progress, FAR, None) else {
             return false;
         };
         let surface = surface_of(inputs.scene, hit);
@@ -162,8 +117,7 @@ fn is_surrounded(inputs: &Inputs<'_>, point: &VisiblePoint, u: f64, v: f64) -> b
         if !passes {
             return surface.material.surface != MATTE || surface.material.base_color[..3] != [0.0; 3];
         }
-        origin = surface.origin_towards(direction);
-        ignored = Some(hit.at);
+        progress = Progress::past(hit);
     }
     false
 }

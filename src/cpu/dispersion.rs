@@ -1,9 +1,8 @@
-//! Light of one wavelength: `glsl/shared/dispersion.glsl` in f64.
+//! Light of one wavelength. `glsl/shared/dispersion.glsl` cites the sources.
 
 use glam::{DVec3, dvec3};
 
 use crate::layout::{LONGEST_WAVELENGTH, Material, SHORTEST_WAVELENGTH};
-use crate::random::Random;
 
 /// The part of a wavelength in linear sRGB, whose mean over all is 1 for each channel.
 fn color_of(wavelength: f64) -> DVec3 {
@@ -24,27 +23,16 @@ fn color_of(wavelength: f64) -> DVec3 {
 }
 
 /// KHR_materials_dispersion: Cauchy's equation through the index at 587.56 nm, with Abbe number 20 / dispersion.
-fn ior_at(material: &Material, wavelength: f64) -> f64 {
+pub fn ior_at(material: &Material, wavelength: f64) -> f64 {
     let (ior, micrometres) = (f64::from(material.ior), wavelength * 1e-3);
     let spread = (ior - 1.0) * f64::from(material.dispersion) / 20.0;
     (ior + spread * (0.523_655 / (micrometres * micrometres) - 1.5168)).max(1.0)
 }
 
-/// Gives a path that meets a boundary a wavelength if it needs one and has none, and the boundary the index for it. Returns the
-/// factor of what the path carries.
-pub(super) fn disperse(material: &mut Material, wavelength: &mut Option<f64>, random: &mut Random) -> DVec3 {
-    if material.dispersion <= 0.0 {
-        return DVec3::ONE;
-    }
-    let mut color = DVec3::ONE;
-    let wavelength = *wavelength.get_or_insert_with(|| {
-        let [u, ..] = random.next4();
-        let chosen = SHORTEST_WAVELENGTH + (LONGEST_WAVELENGTH - SHORTEST_WAVELENGTH) * u;
-        color = color_of(chosen);
-        chosen
-    });
-    material.ior = ior_at(material, wavelength) as f32;
-    color
+/// A wavelength, and the factor of what a path carries that has it alone.
+pub fn choose_wavelength(u: f64) -> (f64, DVec3) {
+    let wavelength = SHORTEST_WAVELENGTH + (LONGEST_WAVELENGTH - SHORTEST_WAVELENGTH) * u;
+    (wavelength, color_of(wavelength))
 }
 
 #[cfg(test)]

@@ -7,15 +7,17 @@ use glam::DVec3;
 use super::vector::xyz;
 
 /// Radiance from a direction.
-pub(super) struct Sky {
+#[derive(Debug, Clone, Copy)]
+pub struct Sky {
+    /// Linear RGB.
     pub radiance: DVec3,
     /// By which [`Environment::sample`] chooses it, per solid angle.
     pub density: f64,
 }
 
 /// The picture and its probabilities: see [`crate::scene::Environment`].
-#[derive(Clone, Copy)]
-pub(super) struct Environment<'a> {
+#[derive(Debug, Clone, Copy)]
+pub struct Environment<'a> {
     width: usize,
     height: usize,
     /// About +Y, in turns.

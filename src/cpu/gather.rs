@@ -1,143 +1,171 @@
-//! The photons within each visible point's radius.
+//! The photons within each visible point's radius: by testing each, and by a kd-tree as the paper's CPU version.
 
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 
-use super::camera::SeenSlice;
-use super::gloss::Reflector;
+use super::reflector::Reflector;
 use super::sampling::decode_direction;
-use super::vector::{mean, rgb, word, xyz};
+use super::vector::{mean, word, xyz};
 use crate::error::{Error, Result};
-use crate::layout::{CAUSTIC, Gathered, NO_OBJECT, Photon, VisiblePoint};
+use crate::layout::{CAUSTIC, Gloss, NO_OBJECT, Photon, VisiblePoint};
 
 /// How much farther than R the kd-tree is asked: more than the rounding of the squared distance, which the tree and
 /// the predicate sum up differently.
 const MARGIN: f32 = 1.0 + 1e-5;
 
-/// Sums of flux and of flux · distance², and number of accepted photons. Thousands of f32 of like size add up in f64 without rounding, so the
-/// order in which photons are found doesn't matter.
-#[derive(Default)]
-struct Sum {
-    flux: DVec3,
-    count: u32,
-    moment: f64,
+/// What a visible point accepted. Thousands of f32 of like size add up in f64 without rounding, so the order in which
+/// photons are found doesn't matter.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Gathered {
+    /// Σ flux, or what of it goes to the viewer.
+    pub flux: DVec3,
+    /// M.
+    pub count: u32,
+    /// Σ flux · distance², flux as the mean of its channels.
+    pub moment: f64,
 }
 
-impl Sum {
-    fn add(&mut self, flux: DVec3, distance2: f32) {
-        self.flux += flux;
-        self.count += 1;
-        self.moment += mean(flux) * f64::from(distance2);
+impl Gathered {
+    /// Adds another part of the iteration's photons.
+    pub fn add(&mut self, other: &Self) {
+        self.flux += other.flux;
+        self.count += other.count;
+        self.moment += other.moment;
     }
 
-    fn add_to(&self, gathered: &mut Gathered) {
-        let flux = (rgb(gathered.flux) + self.flux).as_vec3();
-        gathered.flux = flux.to_array();
-        gathered.count += self.count;
-        gathered.moment = (f64::from(gathered.moment) + self.moment) as f32;
+    /// Σ flux · (1 − 2 distance²/R²), flux as the mean of its channels: 0 on average where photons lie evenly.
+    pub fn curvature(&self, radius2: f64) -> f64 {
+        mean(self.flux) - 2.0 * self.moment / radius2
     }
 }
 
-/// The gather's side of a visible point.
-struct Receiver {
-    position: [f32; 3],
-    radius2: f32,
-    /// With its map's bit, as photons have it.
-    object: u32,
-    normal: DVec3,
-    shading_normal: DVec3,
-    /// Of a scene with glossy surfaces; and the direction to the viewer.
-    reflector: Option<(Reflector, DVec3)>,
-    coated: bool,
-}
-
-fn position(position_object: [f32; 4]) -> [f32; 3] {
-    [position_object[0], position_object[1], position_object[2]]
+/// Where photons are accepted.
+#[derive(Debug, Clone, Copy)]
+pub struct Receiver {
+    /// As photons have it.
+    pub position: [f32; 3],
+    /// R².
+    pub radius2: f32,
+    /// Object, and [`CAUSTIC`] of such photons' map.
+    pub object: u32,
+    /// On the side that is seen.
+    pub normal: DVec3,
 }
 
 impl Receiver {
-    /// `None` where the path met no matte surface.
-    fn new(point: &VisiblePoint, map: usize, radius2: f32, seen: SeenSlice<'_>, slot: usize) -> Option<Self> {
+    /// The squared distance of a photon within R, on the same object, that arrives on the side that is seen. It is rounded to f32
+    /// at each step as in the kernels, so that both count the same photons.
+    fn accepts(&self, photon: &Photon, arriving: DVec3) -> Option<f32> {
+        let here = position(photon);
+        let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| here[axis] - self.position[axis]);
+        let distance2 = x * x + y * y + z * z;
+        let is_within = distance2 <= self.radius2 && word(photon.position_object) == self.object;
+        (is_within && arriving.dot(self.normal) < 0.0).then_some(distance2)
+    }
+}
+
+/// All that gather.
+pub trait Receivers: Sync {
+    /// How many there may be.
+    fn count(&self) -> usize;
+    /// One of them; `None` where a path has no visible point.
+    fn receiver(&self, index: usize) -> Option<Receiver>;
+    /// Factor of the flux of a photon that comes from `l`.
+    fn response(&self, index: usize, l: DVec3) -> DVec3;
+}
+
+/// The kernels' visible points; R² of each, all slots of one photon map, then those of the next.
+#[derive(Debug, Clone, Copy)]
+pub struct SeenByKernels<'a> {
+    /// Visible points.
+    pub points: &'a [VisiblePoint],
+    /// How they scatter; empty where the scene has no glossy surfaces.
+    pub gloss: &'a [Gloss],
+    /// R².
+    pub radii2: &'a [f32],
+}
+
+impl Receivers for SeenByKernels<'_> {
+    fn count(&self) -> usize {
+        self.radii2.len()
+    }
+
+    fn receiver(&self, index: usize) -> Option<Receiver> {
+        let (map, slot) = (index / self.points.len(), index % self.points.len());
+        let point = &self.points[slot];
         let object = word(point.position_object);
-        (object != NO_OBJECT).then(|| Self {
-            position: position(point.position_object),
-            radius2,
+        let [x, y, z, _] = point.position_object;
+        (object != NO_OBJECT).then(|| Receiver {
+            position: [x, y, z],
+            radius2: self.radii2[index],
             object: if map == 1 { object | CAUSTIC } else { object },
             normal: decode_direction(word(point.weight_normal)),
-            shading_normal: decode_direction(word(point.emitted_normal)),
-            reflector: seen.reflector(slot),
-            coated: seen.is_coated(slot),
         })
     }
 
-    /// `gather` of `glsl/shared/gather.glsl`: adds a photon within R, on the same object, that arrives on the side that the
-    /// viewer sees. The distance is rounded to f32 at each step as there, so that both count the same photons.
-    fn gather(&self, photon: &Photon, sum: &mut Sum) {
-        let here = position(photon.position_object);
-        let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| here[axis] - self.position[axis]);
-        let distance2 = x * x + y * y + z * z;
-        let direction = decode_direction(word(photon.flux_direction));
-        if distance2 <= self.radius2 && word(photon.position_object) == self.object && direction.dot(self.normal) < 0.0
-        {
-            let response = self.reflector.map_or(DVec3::ONE, |(reflector, viewer)| {
-                // Photons on coated objects have their flux across their rays, since each layer has a normal of its own.
-                let cosine = -direction.dot(self.shading_normal);
-                let cosine = if self.coated { cosine.max(0.0) } else { 1.0 };
-                reflector.brdf(self.shading_normal, viewer, -direction) * cosine
-            });
-            sum.add(xyz(photon.flux_direction) * response, distance2);
-        }
+    fn response(&self, index: usize, l: DVec3) -> DVec3 {
+        let slot = index % self.points.len();
+        self.gloss.get(slot).map_or(DVec3::ONE, |gloss| {
+            let (reflector, viewer, coated) = Reflector::of_gloss(gloss);
+            let normal = decode_direction(word(self.points[slot].emitted_normal));
+            // Photons on coated objects have their flux across their rays, since each layer has a normal of its own.
+            let cosine = if coated { l.dot(normal).max(0.0) } else { 1.0 };
+            reflector.brdf(normal, viewer, l) * cosine
+        })
     }
 }
 
-/// Adds to each slot, for each photon map, what `gather` sums up for its receiver. `radii2` and `gathered` have all slots of
-/// one map, then those of the next.
-fn for_each_receiver(
-    seen: SeenSlice<'_>,
-    radii2: &[f32],
-    gathered: &mut [Gathered],
-    gather: impl Fn(&Receiver, &mut Sum) + Sync,
-) {
-    let receivers = gathered.par_iter_mut().zip(radii2).enumerate();
-    receivers.for_each(|(index, (gathered, &radius2))| {
-        let (map, slot) = (index / seen.points.len(), index % seen.points.len());
-        if let Some(receiver) = Receiver::new(&seen.points[slot], map, radius2, seen, slot) {
-            let mut sum = Sum::default();
-            gather(&receiver, &mut sum);
-            sum.add_to(gathered);
-        }
-    });
+fn position(photon: &Photon) -> [f32; 3] {
+    let [x, y, z, _] = photon.position_object;
+    [x, y, z]
 }
 
-/// Adds to each slot, for each photon map, the photons that it accepts, by testing every photon. `radii2`: R² of each.
-pub fn gather_naive<'a>(seen: impl Into<SeenSlice<'a>>, radii2: &[f32], photons: &[Photon], gathered: &mut [Gathered]) {
-    for_each_receiver(seen.into(), radii2, gathered, |receiver, sum| {
-        photons.iter().for_each(|photon| receiver.gather(photon, sum));
-    });
+/// What each receiver sums up of the photons that `find` gives it.
+fn gather<R: Receivers>(
+    receivers: &R,
+    photons: &[Photon],
+    find: impl Fn(&Receiver, &mut dyn FnMut(usize)) + Sync,
+) -> Vec<Gathered> {
+    let of_receiver = |index: usize| {
+        let mut gathered = Gathered::default();
+        if let Some(receiver) = receivers.receiver(index) {
+            find(&receiver, &mut |found| {
+                let photon = &photons[found];
+                let arriving = decode_direction(word(photon.flux_direction));
+                if let Some(distance2) = receiver.accepts(photon, arriving) {
+                    let flux = xyz(photon.flux_direction) * receivers.response(index, -arriving);
+                    gathered.flux += flux;
+                    gathered.count += 1;
+                    gathered.moment += mean(flux) * f64::from(distance2);
+                }
+            });
+        }
+        gathered
+    };
+    (0..receivers.count()).into_par_iter().map(of_receiver).collect()
+}
+
+/// What each receiver accepts, by testing every photon.
+pub fn gather_naive<R: Receivers>(receivers: &R, photons: &[Photon]) -> Vec<Gathered> {
+    gather(receivers, photons, |_, visit| (0..photons.len()).for_each(visit))
 }
 
 /// The same by asking a kd-tree for those nearby: the paper's CPU version.
 ///
 /// # Errors
 /// [`Error::Config`] if there are more photons than the tree can number.
-pub fn gather_kd_tree<'a>(
-    seen: impl Into<SeenSlice<'a>>,
-    radii2: &[f32],
-    photons: &[Photon],
-    gathered: &mut [Gathered],
-) -> Result<()> {
+pub fn gather_kd_tree<R: Receivers>(receivers: &R, photons: &[Photon]) -> Result<Vec<Gathered>> {
     if photons.is_empty() {
-        return Ok(());
+        return Ok(vec![Gathered::default(); receivers.count()]);
     }
-    let positions: Vec<[f32; 3]> = photons.iter().map(|photon| position(photon.position_object)).collect();
+    let positions: Vec<[f32; 3]> = photons.iter().map(position).collect();
     let tree = ImmutableKdTree::new_from_slice(&positions)
         .map_err(|error| Error::Config(format!("kd-tree: {error}; try fewer --photons")))?;
-    for_each_receiver(seen.into(), radii2, gathered, |receiver, sum| {
+    Ok(gather(receivers, photons, |receiver, visit| {
         tree.query(&receiver.position)
             .within::<SquaredEuclidean<f32>>(receiver.radius2 * MARGIN)
             .unsorted()
-            .visit(|found| receiver.gather(&photons[found.item as usize], sum));
-    });
-    Ok(())
+            .visit(|found| visit(found.item as usize));
+    }))
 }

@@ -1,4 +1,4 @@
-//! Rays against triangles, in f64: the counterpart of `glsl/shared/intersect.glsl`.
+//! Rays against triangles.
 
 use std::ops::Range;
 
@@ -107,21 +107,15 @@ pub(super) fn nearest_hit_from(
     limit: f64,
     ignored: Option<PlacedTriangle>,
 ) -> Option<Hit> {
-    let search = Search::new(inputs, ray, limit, ignored, false);
+    let search = Search::new(inputs, ray, limit, ignored);
     Search { progress, ..search }.run(inputs)
 }
 
-/// Whether any triangle but `ignored` lies before t = `limit`.
-pub fn is_blocked(inputs: &Inputs<'_>, ray: Ray, limit: f64, ignored: Option<PlacedTriangle>) -> bool {
-    Search::new(inputs, ray, limit, ignored, true).run(inputs).is_some()
-}
-
-/// A search for the nearest or for any hit.
+/// A search for the nearest hit.
 struct Search<'a> {
     scene: &'a PackedScene,
     ray: Ray,
     ignored: Option<PlacedTriangle>,
-    any: bool,
     progress: Progress,
     /// t of the nearest hit so far.
     limit: f64,
@@ -129,12 +123,11 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(inputs: &Inputs<'a>, ray: Ray, limit: f64, ignored: Option<PlacedTriangle>, any: bool) -> Self {
+    fn new(inputs: &Inputs<'a>, ray: Ray, limit: f64, ignored: Option<PlacedTriangle>) -> Self {
         Self {
             scene: inputs.scene,
             ray,
             ignored,
-            any,
             progress: Progress::AT_ORIGIN,
             limit,
             hit: None,
@@ -155,10 +148,6 @@ impl<'a> Search<'a> {
         self.hit
     }
 
-    fn is_over(&self) -> bool {
-        self.any && self.hit.is_some()
-    }
-
     /// Whether a hit counts, and is nearer than the nearest so far.
     fn is_nearer(&self, t: f64, at: PlacedTriangle) -> bool {
         let later = t > self.progress.t || (t == self.progress.t && self.progress.at.is_some_and(|last| last < at));
@@ -169,7 +158,7 @@ impl<'a> Search<'a> {
     fn test(&mut self, triangles: Range<u32>, instance: Option<u32>) {
         for triangle in triangles {
             let at = PlacedTriangle { triangle, instance };
-            if self.ignored == Some(at) || self.is_over() {
+            if self.ignored == Some(at) {
                 continue;
             }
             if let Some((t, u, v)) = intersect_triangle(self.ray, at.corners(self.scene))
@@ -192,7 +181,7 @@ impl<'a> Search<'a> {
         let mut stack = Vec::with_capacity(64);
         stack.push((root, 0.0));
         while let Some((reference, enter)) = stack.pop() {
-            if enter > self.limit * (1.0 + TIE) || self.is_over() {
+            if enter > self.limit * (1.0 + TIE) {
                 continue;
             }
             if reference & LEAF != 0 {

@@ -1,115 +1,66 @@
-//! The stages on the CPU: the oracle of the kernel tests, what `--backend cpu` renders with, and the paper's CPU
-//! column.
+//! A plain progressive photon mapper in f64: what `--backend cpu` renders with, the oracle of the kernels' tests, and the
+//! paper's CPU column (its kd-tree).
 //!
-//! Each stage of `glsl/stages` has a plain function of its name here, which reads and writes the same structs of
-//! [`crate::layout`] and draws the same random numbers. Where it decides, it works in f64 and rounds to f32 what it
-//! stores: intersections, directions, Fresnel, sums, statistics. So it is an oracle and no copy of the kernels; for the
-//! same reason gathering is left to a kd-tree here, and to no grid.
+//! Each module is a part of the physics: `sampling`, `reflector`, `glass` and `bsdf`, `lights` and `environment`, `texture`,
+//! `intersect` and `interaction`, `gather`, `statistics` (equations 2 to 4). They are pure functions, which kernels are compared
+//! with one by one through probes; `camera`, `photons`, `direct` and `renderer` are the algorithm, made of them. It converges to the
+//! kernels' picture, but repeats neither their steps nor what they do to be quick: emission by learned tables, demand, glass
+//! whose reflections are looked at apart, a map for caustics.
 //!
-//! Every function gives the same bits whatever the number of threads: paths are dealt to lanes, not to threads, and no
-//! sum depends on an order.
+//! Every function gives the same bits whatever the number of threads: no sum depends on an order.
 
-mod boundary;
+mod bsdf;
 mod camera;
-mod contact;
 mod coverage;
-mod demand;
 mod direct;
 mod dispersion;
-mod emission;
 mod environment;
 mod gather;
-mod glint;
-mod gloss;
+mod glass;
+mod interaction;
 mod intersect;
-mod light;
-mod light_sources;
+mod lights;
 mod media;
 mod photons;
-mod primitives;
+mod reflector;
 mod renderer;
-mod resolve;
 mod sampling;
+mod slots;
+mod statistics;
 mod surface;
 mod texture;
-mod tiles;
-mod update;
 mod vector;
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
-pub use crate::random::{CameraTurn, PathKind, Random, pcg4d};
-pub use camera::{Seen, SeenSlice, camera};
-pub use coverage::coverage;
-pub use demand::{Demand, Progress, demand, grid_shape, shell_radii};
-pub use direct::direct;
-pub use gather::{gather_kd_tree, gather_naive};
-pub use gloss::Reflector;
-pub use intersect::{Hit, PlacedTriangle, Ray, is_blocked, nearest_hit};
-pub use photons::{Batch, Traced, compact, photons};
-pub use primitives::{scan, sort};
+pub use bsdf::{Branch, Bsdf, Width};
+pub use camera::{CameraPath, VisiblePoint};
+pub use coverage::{Place, can_have_photons, is_surrounded};
+pub use dispersion::ior_at;
+pub use environment::{Environment, Sky};
+pub use gather::{Gathered, Receiver, Receivers, SeenByKernels, gather_kd_tree, gather_naive};
+pub use glass::{Glass, Turn, Turns};
+pub use intersect::{Hit, PlacedTriangle, Ray, nearest_hit};
+pub use lights::{Emission, LightSample, choose_by_power, punctual, sample_emission, sample_incident};
+pub use reflector::Reflector;
 pub use renderer::Renderer;
-pub use resolve::{count_met, resolve, resolve_sequences};
-pub use sampling::{decode_direction, encode_direction};
-pub use tiles::pixel_of;
-pub use update::{GatheredWith, fit_radius, radii, reset, update};
+pub use sampling::{cosine_direction, decode_direction, encode_direction};
+pub use statistics::Statistics;
+pub use surface::{Normals, Surface, offset_origin, surface_at};
+pub use texture::{apply_textures, share_there};
 
 use crate::config::RenderConfig;
-use crate::emission::Table;
 use crate::layout::Settings;
 use crate::packing::PackedScene;
 
 /// A ray's limit where it has none; nothing lies so far, for the scene is 2 long.
 const FAR: f64 = 1e30;
 
-/// What the ray stages read.
+/// What rays read.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// Triangles, materials, lights.
     pub scene: &'a PackedScene,
-    /// What the kernels read as well.
+    /// The camera.
     pub settings: &'a Settings,
-    /// What the kernels are specialised for.
+    /// How it is rendered.
     pub config: &'a RenderConfig,
-    /// What visible points want of photons; none where all are kept.
-    pub demand: Option<&'a Demand>,
-    /// Where photon paths are aimed; without it they start in proportion to the lights' power.
-    pub emission: Option<&'a Table>,
-}
-
-/// What the stages count, as [`crate::layout::StatusCounters`] on a device.
-#[derive(Debug, Default)]
-pub struct Counts {
-    truncated_paths: AtomicU64,
-    non_finite: AtomicU64,
-    landed: AtomicU64,
-}
-
-impl Counts {
-    /// Paths that the bounce limit ended.
-    pub fn truncated_paths(&self) -> u64 {
-        self.truncated_paths.load(Ordering::Relaxed)
-    }
-
-    /// Values that were NaN or infinite and were left out.
-    pub fn non_finite(&self) -> u64 {
-        self.non_finite.load(Ordering::Relaxed)
-    }
-
-    /// Photons that landed where visible points could be, wanted or not.
-    pub fn landed(&self) -> u64 {
-        self.landed.load(Ordering::Relaxed)
-    }
-
-    fn add_landed(&self, photons: u64) {
-        self.landed.fetch_add(photons, Ordering::Relaxed);
-    }
-
-    fn add_truncated(&self, paths: u64) {
-        self.truncated_paths.fetch_add(paths, Ordering::Relaxed);
-    }
-
-    fn add_non_finite(&self, values: u64) {
-        self.non_finite.fetch_add(values, Ordering::Relaxed);
-    }
 }

@@ -1,58 +1,58 @@
-//! The order of the stages in one iteration, on the CPU.
+//! A plain progressive photon mapper: the paper's algorithm step by step, with nothing that only makes it quicker.
 
+use std::ops::Range;
 use std::time::Instant;
 
 use bytemuck::Zeroable;
+use glam::{DVec3, DVec4};
+use rayon::prelude::*;
 
-use super::{
-    Batch, Counts, Demand, GatheredWith, Inputs, Progress, Seen, camera, compact, count_met, coverage, demand, direct,
-    fit_radius, gather_kd_tree, gather_naive, grid_shape, photons, radii, reset, resolve, resolve_sequences,
-    shell_radii, update,
-};
-use crate::backend::{Backend, Counters, DeviceDescription, Resolved, demand_floor2, settings};
-use crate::config::{EmissionChoice, Estimator, RenderConfig, SEQUENCES, Totals};
-use crate::emission::{Aim, is_learned_from};
+use super::Inputs;
+use super::camera::{CameraPath, trace_camera_path};
+use super::coverage::{Place, can_have_photons, is_surrounded};
+use super::direct::direct_light;
+use super::gather::{Gathered, gather_kd_tree, gather_naive};
+use super::photons::{Ending, trace_photon_path};
+use super::slots::{Discs, Pixel, Slot};
+use super::statistics::Statistics;
+use super::vector::{mean, with_word};
+use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
+use crate::config::{Direct, Estimator, RenderConfig, SEQUENCES, Totals, iterations_of};
 use crate::error::{Error, Result};
 use crate::gather::{METHODS, Runs, default_cpu_method};
-use crate::layout::{Coverage, DirectSum, Gathered, Settings, Statistics};
+use crate::layout::{self, COVERAGE_TRUSTED, COVERAGE_WHOLE, Photon, Settings};
 use crate::packing::PackedScene;
-use crate::radius;
-use crate::random::CameraTurn;
+use crate::radius::{self, LEAST_FOOTPRINTS};
+use crate::random::{CameraTurn, PathKind, Random};
 use crate::record::{Launch, Run};
 use crate::scene::Camera;
-use crate::sizes::{Limits, Sizes};
+use crate::sizes::PPM_SLOTS;
 
-/// Lanes that a batch's photon paths are dealt to, whatever the number of threads. As many as on a CPU's Vulkan
-/// device, so that both give the photons in the same order.
-const LANES: u32 = 4096;
-/// Bytes of a batch's photons at the most.
-const PHOTON_BYTES: u64 = 1 << 27;
+/// Photon paths that are followed before their photons are gathered.
+const BATCH: u32 = 1 << 18;
 
 /// A progressive render on the CPU, with all threads of rayon's pool.
 pub struct Renderer {
     scene: PackedScene,
     config: RenderConfig,
-    sizes: Sizes,
     settings: Settings,
-    seen: Seen,
-    statistics: Vec<Statistics>,
-    gathered: Vec<Gathered>,
-    direct_sums: Vec<DirectSum>,
-    /// Of each slot, for each of [`SEQUENCES`].
-    sequence_sums: Vec<[f32; 4]>,
-    coverage: Vec<Coverage>,
+    /// Visible points that a pixel can have.
+    room: usize,
+    /// Of each pixel, row by row from the top left.
+    paths: Vec<CameraPath>,
+    pixels: Vec<Pixel>,
+    /// Those of a pixel lie together.
+    slots: Vec<Slot>,
     /// Median of the initial radii.
     radius: f32,
     photon_flux: Option<f64>,
     totals: Totals,
     counters: Counters,
-    /// Of photon paths, if they are aimed.
-    aim: Option<Aim>,
     made: Instant,
 }
 
 impl Renderer {
-    /// Prepares a render: finds the radius, resets the statistics.
+    /// Prepares a render: finds the radius.
     ///
     /// # Errors
     /// A setting outside its range, or more photons in a batch than the kd-tree can number.
@@ -65,276 +65,301 @@ impl Renderer {
                 method.name
             )));
         }
-        let limits = Limits {
-            storage_buffer_bytes: PHOTON_BYTES,
-            loop_limit: u32::MAX,
-            lanes: LANES,
-            clustered_run: 1,
-            splitting: scene.features.dielectric || scene.features.glossy,
-            specular: scene.features.mirror || scene.features.dielectric,
-            glossy: scene.features.glossy,
-            meshes: scene.object_grids.len() as u32,
-            object_cells: scene.object_cells,
+        let splits = scene.features.dielectric || scene.features.glossy;
+        let room = match config.estimator {
+            Estimator::Ppm if splits => PPM_SLOTS as usize,
+            _ => 1,
         };
-        let sizes = Sizes::new(&config, limits);
-        let (slots, receivers) = (sizes.slots() as usize, sizes.receivers() as usize);
+        let pixels = config.resolution[0] as usize * config.resolution[1] as usize;
         let mut renderer = Self {
             scene: scene.clone(),
-            sizes,
-            settings: Settings {
-                slots_per_pixel: sizes.slots_per_pixel,
-                photon_lanes: sizes.photon_lanes,
-                photon_maps: sizes.photon_maps,
-                ..settings(&config, scene, camera, limits.loop_limit)
-            },
+            settings: settings(&config, scene, camera, u32::MAX),
             config,
-            seen: Seen::default(),
-            statistics: vec![reset(0.0); receivers],
-            gathered: vec![Gathered::zeroed(); receivers],
-            direct_sums: vec![DirectSum::zeroed(); slots],
-            sequence_sums: vec![[0.0; 4]; SEQUENCES as usize * slots],
-            coverage: vec![Coverage::zeroed(); receivers],
+            room,
+            paths: Vec::new(),
+            pixels: vec![Pixel::default(); pixels],
+            slots: vec![Slot::default(); pixels * room],
             radius: 0.0,
             photon_flux: None,
             totals: Totals::default(),
             counters: Counters::default(),
-            aim: None,
             made: Instant::now(),
         };
-        renderer.prepare()?;
+        renderer.choose_radii()?;
         Ok(renderer)
     }
 
-    /// What the stages read of the configuration and the camera.
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
-
-    /// R², N and τ of each slot, for each photon map.
-    pub fn statistics(&self) -> &[Statistics] {
-        &self.statistics
-    }
-
-    /// What the stages read, without what visible points want of photons.
-    fn inputs(&self) -> Inputs<'_> {
+    /// What rays read.
+    pub fn inputs(&self) -> Inputs<'_> {
         Inputs {
             scene: &self.scene,
             settings: &self.settings,
             config: &self.config,
-            demand: None,
-            emission: self.aim.as_ref().map(Aim::table),
         }
     }
 
-    /// Where photon paths start that are aimed; `None` for those that aren't.
-    pub fn aim(&self) -> Option<&Aim> {
-        self.aim.as_ref()
+    /// R², N and τ of all visible points that pixels can have.
+    pub fn statistics(&self) -> impl Iterator<Item = &Statistics> {
+        self.slots.iter().map(|slot| &slot.statistics)
     }
 
-    /// Aims photon paths by pilot rounds, if they are to be aimed, at what discs of a pilot want; then finds the
-    /// radii.
-    fn prepare(&mut self) -> Result<()> {
-        let counts = Counts::default();
-        let seen = camera(&self.inputs(), CameraTurn::FIRST, &counts);
-        let mut of_pilot = vec![reset(0.0); self.statistics.len()];
-        let radii2 = radii(&self.settings, &seen, &mut of_pilot);
-        let demand = self.demand(&seen, &radii2);
-        if self.config.emission == EmissionChoice::Aimed {
-            let paths = self.sizes.pilot_paths(self.config.photons);
-            self.aim = Aim::by_pilots(&self.config, &self.scene, &seen.points, |table, iteration| {
-                let inputs = Inputs {
-                    demand: demand.as_ref(),
-                    emission: Some(table),
-                    ..self.inputs()
-                };
-                let batch = Batch {
-                    iteration,
-                    first_path: 0,
-                    paths,
-                };
-                Ok::<_, Error>(photons(&inputs, batch, &counts).values)
-            })?;
+    /// Each pixel's visible points, and what their paths saw.
+    pub fn trace_camera_paths(&self, turn: CameraTurn) -> Vec<CameraPath> {
+        let width = self.config.resolution[0] as usize;
+        let of_pixel = |pixel: usize| {
+            let pixel = [(pixel % width) as u32, (pixel / width) as u32];
+            trace_camera_path(&self.inputs(), pixel, turn, self.room)
+        };
+        (0..self.pixels.len()).into_par_iter().map(of_pixel).collect()
+    }
+
+    /// The photons of these paths of an iteration, in the paths' order, and how many paths ended in which way.
+    pub fn trace_photon_paths(&self, iteration: u32, paths: Range<u32>) -> (Vec<Photon>, [u64; 2]) {
+        let inputs = self.inputs();
+        let chunks: Vec<u32> = paths.clone().step_by(1024).collect();
+        let of_chunk = |&first: &u32| {
+            let (mut photons, mut ended) = (Vec::new(), [0; 2]);
+            for path in first..(first + 1024).min(paths.end) {
+                match trace_photon_path(&inputs, path, iteration, &mut photons) {
+                    Ending::Absorbed => {}
+                    Ending::Truncated => ended[0] += 1,
+                    Ending::NonFinite => ended[1] += 1,
+                }
+            }
+            (photons, ended)
+        };
+        let (photons, ended): (Vec<_>, Vec<_>) = chunks.par_iter().map(of_chunk).unzip();
+        let ended = ended
+            .iter()
+            .fold([0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+        (photons.concat(), ended)
+    }
+
+    fn gather(&self, photons: &[Photon]) -> Result<Vec<Gathered>> {
+        let discs = Discs {
+            paths: &self.paths,
+            slots: &self.slots,
+            room: self.room,
+        };
+        match METHODS[self.config.gather.unwrap_or_else(default_cpu_method)].runs {
+            Runs::CpuNaive => Ok(gather_naive(&discs, photons)),
+            _ => gather_kd_tree(&discs, photons),
         }
-        self.choose_radius(&seen, demand.as_ref())
     }
 
-    /// Takes the user's radius, or finds first radii from the density of pilot photons: one that suits the median visible
-    /// point, then smaller ones where the photons are denser.
-    fn choose_radius(&mut self, seen: &Seen, demand: Option<&Demand>) -> Result<()> {
+    /// The user's radius, or first radii from the density of pilot photons: one that suits the median visible point, then smaller
+    /// ones where the photons are denser.
+    fn choose_radii(&mut self) -> Result<()> {
+        self.paths = self.trace_camera_paths(CameraTurn::FIRST);
         if self.config.radius.is_none() {
-            let inputs = Inputs {
-                demand,
-                ..self.inputs()
-            };
-            let batch = batch_of(&self.sizes, &self.config, radius::PILOT, 0);
-            let counts = Counts::default();
-            let photons = compact(&photons(&inputs, batch, &counts).lanes);
-            let dropping = radius::is_dropping_worth_it(counts.landed(), photons.len() as u64, self.aim.is_some());
+            let batch = self.config.photons.min(BATCH);
             // The pilot is a batch; the densities of the whole iteration's photons are higher.
-            let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
-            self.config.drop_unwanted &= dropping;
+            let share = batch as f32 / self.config.photons as f32;
+            let (photons, _) = self.trace_photon_paths(radius::PILOT, 0..batch);
             self.photon_flux = radius::mean_flux(&photons);
-            let first = radius::first(&seen.points, &seen.footprints, &photons, share);
-            self.settings.first_footprints = first.map(|first| first.footprints);
-            let wanted = first.map(|first| first.photons as f32 * share);
+            let seen = self.paths.iter().flat_map(|path| &path.points);
+            let as_kernels_have_it = seen.map(|point| {
+                let mut as_they = layout::VisiblePoint::zeroed();
+                as_they.position_object = with_word(point.surface.position, point.surface.object);
+                (as_they, point.footprint as f32)
+            });
+            let (points, footprints): (Vec<_>, Vec<_>) = as_kernels_have_it.unzip();
+            let [first, _] = radius::first(&points, &footprints, &photons, share);
+            self.settings.first_footprints[0] = first.footprints;
+            let wanted = f64::from(first.photons as f32 * share);
             for _ in 0..radius::FITS {
-                let radii2 = radii(&self.settings, seen, &mut self.statistics);
-                gather_kd_tree(seen, &radii2, &photons, &mut self.gathered)?;
-                fit_radius(
-                    wanted,
-                    radius::LEAST_FOOTPRINTS,
-                    &seen.footprints,
-                    &mut self.gathered,
-                    &mut self.statistics,
-                );
+                self.find_discs();
+                let gathered = self.gather(&photons)?;
+                for (index, gathered) in gathered.iter().enumerate() {
+                    let found = f64::from(gathered.count);
+                    if found > wanted {
+                        let point = &self.paths[index / self.room].points[index % self.room];
+                        let radius2 = &mut self.slots[index].statistics.radius2;
+                        let least2 = (f64::from(LEAST_FOOTPRINTS) * point.footprint).powi(2);
+                        *radius2 = (*radius2 * wanted / found).max(radius2.min(least2));
+                    }
+                }
             }
-            if self.sizes.photon_maps == 2 {
-                let caustic = &mut self.statistics[seen.points.len()..];
-                radius::sharpen(self.config.resolution, &seen.footprints, caustic);
-            }
-        } else {
-            radii(&self.settings, seen, &mut self.statistics);
         }
-        self.radius = radius::median(&self.statistics[..seen.points.len()]);
+        self.find_discs();
+        let mut radii2: Vec<f64> = self
+            .statistics()
+            .map(|s| s.radius2)
+            .filter(|&radius2| radius2 > 0.0)
+            .collect();
+        radii2.sort_unstable_by(f64::total_cmp);
+        self.radius = radii2
+            .get(radii2.len() / 2)
+            .map_or(0.0, |radius2| radius2.sqrt() as f32);
         Ok(())
     }
 
-    /// What visible points with discs of `radii2` want of photons.
-    fn demand(&self, seen: &Seen, radii2: &[f32]) -> Option<Demand> {
-        if !self.config.drops_unwanted() {
-            return None;
+    /// The discs of the visible points. A slot's first one sets its R; no disc is larger than a multiple of the pixel's footprint.
+    fn find_discs(&mut self) {
+        let settings = &self.settings;
+        for (path, slots) in self.paths.iter().zip(self.slots.chunks_mut(self.room)) {
+            for (point, slot) in path.points.iter().zip(slots) {
+                let radius2 = &mut slot.statistics.radius2;
+                if *radius2 == 0.0 {
+                    let first = f64::from(settings.first_footprints[0]) * point.footprint;
+                    *radius2 = match settings.initial_radius2 {
+                        0.0 => first.powi(2).max(1e-24),
+                        given => given.into(),
+                    };
+                }
+                let most = f64::from(settings.most_footprints[0]) * point.footprint;
+                slot.disc = if most > 0.0 {
+                    radius2.min((most * most).max(1e-24))
+                } else {
+                    *radius2
+                };
+            }
         }
-        let step = self.sizes.radius_step();
-        let grid = grid_shape(&shell_radii(&self.settings, &seen.points, radii2, step));
-        let progress = Progress {
-            statistics: &self.statistics,
-            coverage: &self.coverage,
-            direct_sums: &self.direct_sums,
-            iterations: self.totals.iterations,
-            emitted: self.totals.emitted,
+    }
+
+    /// Adds what the paths' pixels see directly.
+    fn add_direct(&mut self, turn: CameraTurn) {
+        let inputs = Inputs {
+            scene: &self.scene,
+            settings: &self.settings,
+            config: &self.config,
         };
-        Some(demand(&self.settings, seen, radii2, progress, grid))
+        let asks =
+            turn.path == 0 && inputs.scene.features.dielectric && inputs.config.asks_behind_glass(turn.iteration);
+        let of_pixel = |(index, (pixel, path)): (usize, (&mut Pixel, &CameraPath))| {
+            let mut radiance = path.emitted;
+            if inputs.config.direct == Direct::Light {
+                let mut random = Random::of_pixel(inputs.config, PathKind::LightSample, index as u32, turn);
+                for point in &path.points {
+                    let light = direct_light(&inputs, point, asks, &mut random);
+                    radiance += light.radiance;
+                    pixel.unbent += light.unbent;
+                }
+                pixel.asked += u32::from(asks);
+            }
+            radiance /= f64::from(turn.paths);
+            pixel.direct += radiance;
+            pixel.sequences[(turn.iteration % SEQUENCES) as usize] += radiance.extend(0.0);
+            pixel.met += u32::from(path.met);
+        };
+        self.pixels
+            .par_iter_mut()
+            .zip(&self.paths)
+            .enumerate()
+            .for_each(of_pixel);
+        self.counters.truncated_paths += self.paths.iter().map(|path| path.truncated).sum::<u64>();
+    }
+
+    /// Asks points of the discs whether they can have photons; and as long as a pixel has none, whether any can come.
+    fn add_coverage(&mut self, iteration: u32, gathered: &[Gathered]) {
+        let inputs = Inputs {
+            scene: &self.scene,
+            settings: &self.settings,
+            config: &self.config,
+        };
+        let points = inputs.config.coverage_points(iteration);
+        let slots = self
+            .slots
+            .par_iter_mut()
+            .zip(&mut self.pixels)
+            .zip(&self.paths)
+            .zip(gathered);
+        slots
+            .enumerate()
+            .for_each(|(index, (((slot, pixel), path), gathered))| {
+                let Some(point) = path.points.first() else { return };
+                let normal = point.bsdf.normals().geometric;
+                let place = Place {
+                    origin: point.surface.origin_towards(normal),
+                    normal,
+                    object: point.surface.object,
+                };
+                let mut random = Random::of_disc(inputs.config, index as u32, iteration, points);
+                let trusted = slot.covered == f64::from(slot.asked) && slot.asked >= COVERAGE_TRUSTED;
+                if slot.statistics.accepted == 0 && gathered.count == 0 {
+                    random.skip_to(COVERAGE_WHOLE); // those of the disc come before
+                    let [u, v, ..] = random.next4();
+                    pixel.surrounded |= is_surrounded(&inputs, place, [u, v]);
+                } else if !trusted || iteration.is_multiple_of(8) {
+                    let covered = (0..points).filter(|&number| {
+                        let [u, v, ..] = random.sample_of(number, points).next4();
+                        can_have_photons(&inputs, place, slot.disc.sqrt(), [u, v])
+                    });
+                    slot.covered += covered.count() as f64 / f64::from(points);
+                    slot.asked += 1;
+                }
+            });
+    }
+
+    /// Takes the photons of an iteration, of so many paths.
+    fn take(&mut self, iteration: u32, emitted: u32, gathered: &[Gathered]) {
+        let alpha = f64::from(self.config.alpha);
+        for (index, gathered) in gathered.iter().enumerate().filter(|(_, gathered)| gathered.count > 0) {
+            let (pixel, number) = (index / self.room, index % self.room);
+            let throughput = self.paths[pixel].points[number].throughput;
+            let slot = &mut self.slots[index];
+            // τ is that of a disc of R. A smaller one has been gathered from where that has a bound.
+            let larger = slot.statistics.radius2 / slot.disc;
+            let of_disc = Statistics {
+                flux: throughput * gathered.flux * larger,
+                ..slot.statistics
+            };
+            let curvature = Statistics {
+                flux: DVec3::splat(mean(throughput) * gathered.curvature(slot.disc) * larger),
+                ..of_disc
+            };
+            let [radiance, curvature] = [of_disc, curvature].map(|part| part.radiance(slot.share(), emitted.into()));
+            let sequence = (iteration % SEQUENCES) as usize;
+            self.pixels[pixel].sequences[sequence] += radiance.extend(curvature.x);
+            slot.statistics.take(gathered.count, of_disc.flux, alpha);
+        }
     }
 }
 
 impl Backend for Renderer {
     fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
         let iteration = self.totals.iterations;
-        if self.aim.is_some() && self.config.begins_sequences(iteration) {
-            if iteration > 0 {
-                self.settings.demand_floor2 = demand_floor2(&self.resolve()?);
-            }
-            // What an iteration learns changes no sequence.
-            if let Some(aim) = &mut self.aim {
-                aim.update();
-            }
-        }
-        let inputs = Inputs {
-            scene: &self.scene,
-            settings: &self.settings,
-            config: &self.config,
-            demand: None,
-            emission: self.aim.as_ref().map(Aim::table),
-        };
-        let counts = Counts::default();
-        let mut values = Vec::new();
         let mut clock = Clock {
             made: self.made,
             run: Run::default(),
         };
-        let slots = self.direct_sums.len();
-        let sequence = (iteration % SEQUENCES) as usize * slots;
-        let sequence = sequence..sequence + slots;
         let mut turn = CameraTurn::that_gathers(&self.config, iteration);
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
-            self.seen = clock.time("camera", || camera(&inputs, turn, &counts));
+            self.paths = clock.time("camera", || self.trace_camera_paths(turn));
+            self.find_discs();
         }
-        let radii2 = clock.time("radii", || radii(&self.settings, &self.seen, &mut self.statistics));
-        let demand = clock.time("demand", || self.demand(&self.seen, &radii2));
-        let inputs = Inputs {
-            demand: demand.as_ref(),
-            ..inputs
-        };
-        let mut stored = 0;
-        let mut emitted = 0;
-        for batch in 0..self.sizes.batches(self.config.photons) {
+        let mut gathered = vec![Gathered::default(); self.slots.len()];
+        let (mut emitted, mut stored, mut ended) = (0, 0, [0; 2]);
+        while emitted < self.config.photons {
             if emitted > 0 && stop() {
                 if iteration > 0 {
-                    self.gathered.fill(Gathered::zeroed());
                     return Ok(None);
                 }
                 // More camera paths could take longer than what was cut.
                 turn.paths = 1;
                 break;
             }
-            let batch = batch_of(&self.sizes, &self.config, iteration, batch);
-            let traced = clock.time("photons", || photons(&inputs, batch, &counts));
-            let photons = clock.time("compact", || compact(&traced.lanes));
-            if batch.first_path == 0 {
-                values = traced.values;
-            }
-            let (seen, gathered) = (&self.seen, &mut self.gathered);
-            match METHODS[self.config.gather.unwrap_or_else(default_cpu_method)].runs {
-                Runs::CpuNaive => {
-                    clock.time("gather_naive", || gather_naive(seen, &radii2, &photons, gathered));
-                }
-                _ => clock.time("gather_kd_tree", || gather_kd_tree(seen, &radii2, &photons, gathered))?,
-            }
+            let batch = emitted..emitted + BATCH.min(self.config.photons - emitted);
+            emitted = batch.end;
+            let (photons, of_batch) = clock.time("photons", || self.trace_photon_paths(iteration, batch));
+            ended = [ended[0] + of_batch[0], ended[1] + of_batch[1]];
             stored += photons.len() as u64;
-            emitted += batch.paths;
+            let accepted = clock.time("gather", || self.gather(&photons))?;
+            gathered.iter_mut().zip(&accepted).for_each(|(sum, part)| sum.add(part));
         }
-        let sequence = &mut self.sequence_sums[sequence];
-        clock.time("direct", || {
-            let (statistics, sums) = (&self.statistics, &mut self.direct_sums);
-            direct(&inputs, turn, &self.seen, statistics, &counts, sums, sequence);
-            count_met(&self.seen.points, &mut self.coverage);
-        });
+        clock.time("direct", || self.add_direct(turn));
         if self.config.estimator == Estimator::Sppm {
-            let points = &self.seen.points;
-            clock.time("coverage", || {
-                coverage(
-                    &inputs,
-                    iteration,
-                    points,
-                    &radii2,
-                    (&self.statistics, &self.gathered),
-                    &mut self.coverage,
-                )
-            });
+            clock.time("coverage", || self.add_coverage(iteration, &gathered));
         }
-        let gathered_with = GatheredWith {
-            radii2: &radii2,
-            coverage: &self.coverage,
-            photons: emitted,
-            alpha: self.config.alpha,
-        };
-        clock.time("update", || {
-            update(
-                &self.seen.points,
-                gathered_with,
-                &counts,
-                &mut self.gathered,
-                &mut self.statistics,
-                sequence,
-            );
-        });
+        clock.time("update", || self.take(iteration, emitted, &gathered));
         for turn in turn.others() {
-            self.seen = clock.time("camera", || camera(&inputs, turn, &counts));
-            clock.time("direct", || {
-                let (statistics, sums) = (&self.statistics, &mut self.direct_sums);
-                direct(&inputs, turn, &self.seen, statistics, &counts, sums, sequence);
-                count_met(&self.seen.points, &mut self.coverage);
-            });
+            self.paths = clock.time("camera", || self.trace_camera_paths(turn));
+            clock.time("direct", || self.add_direct(turn));
         }
-        if let Some(aim) = &mut self.aim
-            && is_learned_from(&self.config, iteration)
-        {
-            aim.learn(&self.config, iteration, 0, &values);
-        }
+        self.counters.photons_landed += stored;
         self.counters.photons_stored += stored;
-        self.counters.truncated_paths += counts.truncated_paths();
-        self.counters.non_finite += counts.non_finite();
-        self.counters.photons_landed += counts.landed();
+        self.counters.truncated_paths += ended[0];
+        self.counters.non_finite += ended[1];
         self.totals.add(Totals {
             iterations: 1,
             emitted: emitted.into(),
@@ -344,18 +369,34 @@ impl Backend for Renderer {
     }
 
     fn resolve_all(&mut self) -> Result<Resolved> {
-        self.counters.photons_accepted = self.statistics.iter().map(Statistics::accepted).sum();
+        self.counters.photons_accepted = self.statistics().map(|statistics| statistics.accepted).sum();
         let totals = self.totals.at_least_one();
-        let (film, behind_glass, non_finite) = resolve(
-            &self.settings,
-            &self.seen.points,
-            &self.statistics,
-            &self.direct_sums,
-            &self.coverage,
-            totals,
-        );
+        let mut non_finite = 0;
+        // What f32 can't hold is black.
+        let rounded = |value: DVec4| Some(value.as_vec4()).filter(|value| value.is_finite());
+        let (mut film, mut behind_glass) = (Vec::new(), Vec::new());
+        for (index, pixel) in self.pixels.iter().enumerate() {
+            let slots = &self.slots[index * self.room..][..self.room];
+            let (radiance, glass) = pixel.resolve(&self.paths[index].points, slots, totals);
+            let waits = pixel.surrounded && slots.iter().all(|slot| slot.statistics.accepted == 0);
+            let alpha = pixel.met as f32 / totals.camera_paths as f32;
+            let radiance = rounded(radiance.extend(0.0));
+            non_finite += u64::from(radiance.is_none());
+            let [r, g, b, _] = radiance.unwrap_or_default().to_array();
+            film.push([r, g, b, if waits { -alpha } else { alpha }]);
+            behind_glass.push(glass);
+        }
+        let mut sequences = Vec::new();
+        for sequence in 0..SEQUENCES {
+            let iterations = iterations_of(sequence, totals.iterations).max(1);
+            let of_pixel = |pixel: &Pixel| pixel.sequences[sequence as usize] / f64::from(iterations);
+            let pictures = self
+                .pixels
+                .iter()
+                .map(|pixel| rounded(of_pixel(pixel)).unwrap_or_default());
+            sequences.extend(pictures.map(|value| value.to_array()));
+        }
         self.counters.non_finite += non_finite;
-        let sequences = resolve_sequences(&self.settings, &self.sequence_sums, totals.iterations);
         Ok(Resolved::from_film(
             self.config.resolution,
             &film,
@@ -385,11 +426,11 @@ impl Backend for Renderer {
     }
 
     fn aims(&self) -> bool {
-        self.aim.is_some()
+        false
     }
 
     fn photon_maps(&self) -> u32 {
-        self.sizes.photon_maps
+        1
     }
 
     fn device(&self) -> DeviceDescription {
@@ -401,16 +442,7 @@ impl Backend for Renderer {
     }
 }
 
-fn batch_of(sizes: &Sizes, config: &RenderConfig, iteration: u32, batch: u32) -> Batch {
-    let first_path = batch * sizes.batch_paths;
-    Batch {
-        iteration,
-        first_path,
-        paths: sizes.batch_paths.min(config.photons - first_path),
-    }
-}
-
-/// Notes when stages run.
+/// Notes when steps run.
 struct Clock {
     made: Instant,
     run: Run,

@@ -33,7 +33,7 @@ pub(super) fn disc_point(u: f64, v: f64) -> DVec2 {
 }
 
 /// A unit vector around the unit vector `n` with density cos θ / π (Malley's method).
-pub(super) fn cosine_direction(n: DVec3, u: f64, v: f64) -> DVec3 {
+pub fn cosine_direction(n: DVec3, u: f64, v: f64) -> DVec3 {
     let p = disc_point(u, v);
     (basis(n) * p.extend((1.0 - p.length_squared()).max(0.0).sqrt())).normalize()
 }

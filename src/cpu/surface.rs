@@ -1,24 +1,21 @@
-//! Where a ray meets a surface and how it goes on: `surface_at` and `offset_origin` of `glsl/shared/scene.glsl`, and
-//! `glsl/shared/bsdf.glsl`, in f64.
-
-use std::f64::consts::PI;
+//! A point of a surface, and where rays leave it.
 
 use glam::{DMat3, DVec3};
 
-use super::gloss::{Reflector, coat_passes, schlick};
 use super::intersect::{Hit, PlacedTriangle};
 use super::sampling::decode_direction;
-use super::vector::{rgb, word};
-use crate::layout::{COAT_F0, DIELECTRIC, GLOSSY_SURFACE, Material, RANK, ROUNDINGS, SMOOTH_SHADED, ShadingTriangle};
+use super::vector::word;
+use crate::layout::{Material, RANK, ROUNDINGS, SMOOTH_SHADED, ShadingTriangle};
 use crate::packing::PackedScene;
 
 /// A point of a triangle.
-#[derive(Clone, Copy)]
-pub(super) struct Surface {
+#[derive(Debug, Clone, Copy)]
+pub struct Surface {
     /// Which triangle.
     pub triangle: PlacedTriangle,
     /// Barycentric coordinates of its second and third corner.
     pub uv: [f64; 2],
+    /// Render units.
     pub position: DVec3,
     /// Largest coordinates of the triangle's corners, or what those are sums of, without their signs.
     pub reach: DVec3,
@@ -28,6 +25,7 @@ pub(super) struct Surface {
     pub shading_normal: DVec3,
     /// Likewise, of a clear coat.
     pub coat_normal: DVec3,
+    /// Its index.
     pub object: u32,
     /// Without its textures, until [`super::texture::apply_textures`].
     pub material: Material,
@@ -40,7 +38,7 @@ pub(super) struct Surface {
 }
 
 /// The point with the barycentric coordinates `u` and `v` of the second and the third corner.
-pub(super) fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64) -> Surface {
+pub fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64) -> Surface {
     let triangle = &scene.shading_triangles[at.triangle as usize];
     let [p0, p1, p2] = at.corners(scene);
     let mut geometric_normal = (p1 - p0).cross(p2 - p0).normalize();
@@ -77,7 +75,7 @@ pub(super) fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64
 }
 
 /// The point that a ray met.
-pub(super) fn surface_of(scene: &PackedScene, hit: Hit) -> Surface {
+pub fn surface_of(scene: &PackedScene, hit: Hit) -> Surface {
     surface_at(scene, hit.at, hit.u, hit.v)
 }
 
@@ -116,140 +114,37 @@ fn interpolated_normal(
 /// Moves a ray's origin off its surface, to the side of `n`, by a bound of the rounding errors that positions and planes
 /// of triangles with corners up to `reach` have on a device: Pharr, Jakob and Humphreys, «Physically Based Rendering»,
 /// 3rd edition, 2016, section 3.9.5.
-pub(super) fn offset_origin(position: DVec3, n: DVec3, reach: DVec3) -> DVec3 {
+pub fn offset_origin(position: DVec3, n: DVec3, reach: DVec3) -> DVec3 {
     position + ROUNDINGS * n.abs().dot(reach) * n
 }
 
-/// Largest coordinates of an object, without their signs, or a little more.
-pub(super) fn reach_of(scene: &PackedScene, object: u32) -> DVec3 {
-    let grid = &scene.object_grids[object as usize];
-    let low = rgb(grid.low);
-    let size = DVec3::from_array(grid.cells.map(f64::from)) / f64::from(grid.inverse_cell);
-    low.abs().max((low + size).abs())
-}
-
-/// A ray's meeting with a surface, with both normals turned to the side that the ray comes from.
-#[derive(Clone, Copy)]
-pub(super) struct Facing {
-    pub geometric_normal: DVec3,
-    pub shading_normal: DVec3,
-    /// The ray meets the triangle's front.
+/// The normals of a surface, turned to the side that a path comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct Normals {
+    /// Of the triangle.
+    pub geometric: DVec3,
+    /// Interpolated, or of a texture.
+    pub shading: DVec3,
+    /// Of a clear coat.
+    pub coat: DVec3,
+    /// The path meets the triangle's front.
     pub front: bool,
 }
 
-impl Facing {
-    pub fn new(surface: &Surface, incoming: DVec3) -> Self {
-        let front = incoming.dot(surface.geometric_normal) < 0.0;
+impl Normals {
+    /// Those that are seen from `v`, a unit vector away from the surface; given on the triangle's front: geometric, shading, coat.
+    pub fn of([geometric, shading, coat]: [DVec3; 3], v: DVec3) -> Self {
+        let front = v.dot(geometric) > 0.0;
         let side = if front { 1.0 } else { -1.0 };
-        let geometric_normal = side * surface.geometric_normal;
-        let shading_normal = side * surface.shading_normal;
+        let geometric = side * geometric;
+        // Past another normal's horizon the geometric normal stands in.
+        let facing = |n: DVec3| if v.dot(side * n) > 0.0 { side * n } else { geometric };
         Self {
-            geometric_normal,
-            // Past the shading normal's horizon the geometric normal stands in.
-            shading_normal: if incoming.dot(shading_normal) < 0.0 {
-                shading_normal
-            } else {
-                geometric_normal
-            },
+            geometric,
+            shading: facing(shading),
+            coat: facing(coat),
             front,
         }
-    }
-
-    /// The incoming direction, mirrored.
-    pub fn reflect(&self, incoming: DVec3) -> DVec3 {
-        let about = |n: DVec3| incoming - 2.0 * incoming.dot(n) * n;
-        let reflected = about(self.shading_normal);
-        if reflected.dot(self.geometric_normal) > 0.0 {
-            reflected.normalize()
-        } else {
-            about(self.geometric_normal).normalize()
-        }
-    }
-
-    /// Where a path goes that follows what a boundary of microfacets reflects, and its weight: none of it where that would
-    /// fly into the surface.
-    pub fn follow(&self, reflector: &Reflector, incoming: DVec3, u: [f64; 2]) -> (DVec3, DVec3) {
-        let direction = if reflector.is_smooth() {
-            self.reflect(incoming)
-        } else {
-            reflector.reflected_direction(self.shading_normal, -incoming, u)
-        };
-        let weight = if direction.dot(self.geometric_normal) > 0.0 {
-            reflector.reflected_weight(self.shading_normal, -incoming, direction)
-        } else {
-            DVec3::ZERO
-        };
-        (direction, weight)
-    }
-
-    /// What a ray meets of a coated surface is by chance the coat, which then is the material, or what lies below it. Returns
-    /// the factor of what the path carries. The inside of glass has no coat.
-    pub fn choose_layer(&mut self, material: &mut Material, coat_normal: DVec3, incoming: DVec3, u: f64) -> f64 {
-        if !(self.front || material.surface != DIELECTRIC || material.thin != 0) {
-            return 1.0;
-        }
-        let n = if self.front { coat_normal } else { -coat_normal };
-        let n = if incoming.dot(n) < 0.0 {
-            n
-        } else {
-            self.geometric_normal
-        };
-        let coat = f64::from(material.coat);
-        let p = (1.0 - coat_passes(coat, -incoming.dot(n))).clamp(0.25 * coat, 0.9);
-        if u >= p {
-            return 1.0 / (1.0 - p);
-        }
-        self.shading_normal = n;
-        *material = Material {
-            surface: GLOSSY_SURFACE,
-            base_color: [0.0; 3],
-            metallic: 0.0,
-            roughness: material.coat_roughness,
-            specular_f0: [(COAT_F0 * coat) as f32; 3],
-            specular_f90: material.coat,
-            coat: 0.0,
-            ..*material
-        };
-        1.0 / p
-    }
-
-    /// Where a glossy surface scatters a photon to, instead of the cosine-distributed `outgoing` or as that says, and the
-    /// part of the flux that goes there.
-    pub fn scatter(&self, reflector: &Reflector, incoming: DVec3, u: [f64; 4], outgoing: DVec3) -> (DVec3, DVec3) {
-        let (n, v) = (self.shading_normal, -incoming);
-        let nv = n.dot(v);
-        let p = reflector.reflection_probability(nv);
-        let reflects = u[3] < p;
-        if reflector.is_smooth() {
-            return if reflects {
-                let passes = coat_passes(reflector.coat, nv);
-                (self.reflect(incoming), reflector.fresnel(nv) * passes / p)
-            } else {
-                (outgoing, PI / (1.0 - p) * reflector.brdf(n, v, outgoing))
-            };
-        }
-        let outgoing = if reflects {
-            reflector.reflected_direction(n, v, [u[0], u[1]])
-        } else {
-            outgoing
-        };
-        let cosine = outgoing.dot(self.geometric_normal).max(0.0);
-        let density = (1.0 - p) * cosine / PI + p * reflector.reflected_density(n, v, outgoing);
-        (outgoing, reflector.brdf(n, v, outgoing) * (cosine / density.max(1e-20)))
-    }
-
-    /// Reflectance of a mirror of this material: Schlick's approximation, as glTF 2.0, appendix B, has it.
-    pub fn mirror_reflectance(&self, material: &Material, incoming: DVec3) -> DVec3 {
-        let f0 = rgb(material.base_color);
-        let cosine = -incoming.dot(self.shading_normal);
-        let passes = coat_passes(f64::from(material.coat), cosine);
-        passes * (f0 + (1.0 - f0) * schlick(cosine))
-    }
-
-    /// What the shading normal's cosine makes of a photon's flux, which is per area of the geometric surface: Veach, «Robust
-    /// Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3.
-    pub fn landing_correction(&self, incoming: DVec3) -> f64 {
-        incoming.dot(self.shading_normal) / incoming.dot(self.geometric_normal)
     }
 }
 

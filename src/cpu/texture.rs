@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3, DVec4};
 use half::f16;
 
 use super::Inputs;
-use super::contact::is_hidden_back;
+use super::interaction::is_hidden_back;
 use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
 use super::sampling::decode_direction;
 use super::surface::{Surface, surface_of};
@@ -57,7 +57,7 @@ fn value(scene: &PackedScene, texture: u32, place: &Place) -> Option<DVec4> {
 }
 
 /// Gives a surface the material of its place. A texture of normals turns its shading normal.
-pub(super) fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
+pub fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
     if surface.flags & TEXTURED_TRIANGLE == 0 {
         return;
     }
@@ -121,7 +121,7 @@ fn leaning_normal(n: DVec3, surface: &Surface, place: &Place, value: DVec3, scal
 }
 
 /// The part of a surface that is there, at its place.
-pub(super) fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
+pub fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
     if surface.flags & SEE_THROUGH == 0 {
         return 1.0;
     }

@@ -9,7 +9,7 @@ fn of_radiance(radiance: f64) -> OnePhoton {
 
 /// Uniform in [0, 1), the same in every run.
 fn random(index: u32, seed: u32) -> f64 {
-    f64::from(crate::cpu::pcg4d([index, seed, 7, 11])[0]) / 4_294_967_296.0
+    f64::from(crate::random::pcg4d([index, seed, 7, 11])[0]) / 4_294_967_296.0
 }
 
 /// A picture after so many iterations, each of which gives pixels what `of_iteration` says: RGB and curvature, infinite where

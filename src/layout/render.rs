@@ -241,6 +241,14 @@ fn wide(low: u32, high: u32) -> u64 {
 }
 
 impl Statistics {
+    /// Before the first photon, with R² in square render units; 0 where the first visible point sets it.
+    pub fn of_radius2(radius2: f32) -> Self {
+        Self {
+            radius2_high: radius2,
+            ..Self::zeroed()
+        }
+    }
+
     /// Photons accepted so far.
     pub fn accepted(&self) -> u64 {
         wide(self.accepted_low, self.accepted_high)

@@ -29,14 +29,6 @@ impl Sphere {
         })
     }
 
-    /// From what [`Sphere::packed`] gives.
-    pub fn of([x, y, z, radius]: [f32; 4]) -> Self {
-        Self {
-            centre: DVec3::new(x.into(), y.into(), z.into()),
-            radius: radius.into(),
-        }
-    }
-
     /// As the device has it.
     pub fn packed(&self) -> [f32; 4] {
         self.centre.as_vec3().extend(self.radius as f32).to_array()
@@ -64,14 +56,6 @@ impl Sphere {
         self.centre.distance(other.centre) + Self::MARGIN * other.radius <= self.radius
     }
 
-    /// Whether a ray along a unit vector meets it. One that comes from afar has no beginning.
-    pub fn is_met(&self, origin: DVec3, direction: DVec3, from_afar: bool) -> bool {
-        let to_centre = self.centre - origin;
-        let along = to_centre.dot(direction);
-        let along = if from_afar { along } else { along.max(0.0) };
-        (to_centre - along * direction).length_squared() <= self.radius * self.radius
-    }
-
     /// 1 − cos of the angle between the axis and the sides of the cone in which it is seen; 2 from inside.
     pub fn versine(&self, from: DVec3) -> f64 {
         let sin2 = self.radius * self.radius / self.centre.distance_squared(from);
@@ -80,16 +64,5 @@ impl Sphere {
         } else {
             2.0
         }
-    }
-
-    /// That cone's axis, any from inside, and [`Sphere::versine`].
-    pub fn cone(&self, from: DVec3) -> (DVec3, f64) {
-        let versine = self.versine(from);
-        let axis = if versine < 2.0 {
-            (self.centre - from).normalize()
-        } else {
-            DVec3::Z
-        };
-        (axis, versine)
     }
 }

@@ -6,17 +6,14 @@ use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3};
 use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
-use ppm_vk::cpu;
-use ppm_vk::emission::Aim;
+use ppm_vk::cpu::{self, SeenByKernels};
 use ppm_vk::film::Image;
 use ppm_vk::gpu::Device;
-use ppm_vk::layout::{CAUSTIC, NEAREST, NO_OBJECT, Photon, Settings, TextureLookup, VisiblePoint};
+use ppm_vk::layout::{CAUSTIC, Gloss, NEAREST, NO_OBJECT, Photon, Settings, TextureLookup, VisiblePoint};
 use ppm_vk::packing::PackedScene;
 use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::Emission;
-use ppm_vk::scene::Environment;
-use ppm_vk::scene::PunctualLight;
-use ppm_vk::scene::Scene;
+use ppm_vk::random::{PathKind, Random};
+use ppm_vk::scene::{Camera, Emission, Environment, PunctualLight, Scene};
 use ppm_vk::stage::BufferId;
 
 /// What the names of scenes end in that have a light of every kind more than their file.
@@ -127,14 +124,30 @@ pub fn small() -> RenderConfig {
     }
 }
 
+/// Visible points of the device, and how they scatter; of no glossy scene the latter is empty.
+pub struct Seen {
+    pub points: Vec<VisiblePoint>,
+    pub gloss: Vec<Gloss>,
+}
+
+impl Seen {
+    /// As the CPU gathers at them, with R² of each.
+    pub fn with<'a>(&'a self, radii2: &'a [f32]) -> SeenByKernels<'a> {
+        SeenByKernels {
+            points: &self.points,
+            gloss: &self.gloss,
+            radii2,
+        }
+    }
+}
+
 /// A scene, and a renderer for it that has done one iteration.
 pub struct Bench {
     pub scene: PackedScene,
+    camera: Camera,
     pub config: RenderConfig,
     pub settings: Settings,
     pub renderer: Renderer,
-    /// What visible points wanted of the iteration's photons.
-    pub demand: Option<cpu::Demand>,
 }
 
 impl Bench {
@@ -151,40 +164,38 @@ impl Bench {
         let mut renderer = Renderer::new(device, &scene, &loaded.cameras[0], config.clone()).expect("a renderer");
         renderer.iterate().expect("an iteration");
         let settings = download(&mut renderer, BufferId::Settings)[0];
-        let demand = renderer.drops_unwanted().then(|| cpu::Demand {
-            entries: download(&mut renderer, BufferId::Demand),
-            grid: download(&mut renderer, BufferId::Grid)[0],
-        });
         Self {
             scene,
+            camera: loaded.cameras[0].clone(),
             config,
             settings,
             renderer,
-            demand,
         }
     }
 
-    /// What the CPU's stages read.
+    /// The same by the plain renderer.
+    pub fn plain(&self) -> cpu::Renderer {
+        cpu::Renderer::new(&self.scene, &self.camera, self.config.clone()).expect("a renderer")
+    }
+
+    /// What the CPU's functions read.
     pub fn inputs(&self) -> cpu::Inputs<'_> {
         cpu::Inputs {
             scene: &self.scene,
             settings: &self.settings,
             config: &self.config,
-            demand: self.demand.as_ref(),
-            emission: self.renderer.aim().map(Aim::table),
         }
     }
 
     /// The visible points that the device found last.
-    pub fn seen(&mut self) -> cpu::Seen {
-        cpu::Seen {
+    pub fn seen(&mut self) -> Seen {
+        Seen {
             points: self.download(BufferId::VisiblePoints),
             gloss: if self.scene.features.glossy {
                 self.download(BufferId::GlossOf)
             } else {
                 Vec::new()
             },
-            footprints: self.download(BufferId::Footprints),
         }
     }
 
@@ -238,6 +249,14 @@ pub fn object(position_object: [f32; 4]) -> Option<u32> {
     (object != NO_OBJECT).then_some(object & !CAUSTIC)
 }
 
+/// Largest coordinates of an object, without their signs, or a little more: kernels leave visible points by them.
+pub fn reach_of(scene: &PackedScene, object: u32) -> DVec3 {
+    let grid = &scene.object_grids[object as usize];
+    let low = DVec3::from_array(grid.low.map(f64::from));
+    let size = DVec3::from_array(grid.cells.map(f64::from)) / f64::from(grid.inverse_cell);
+    low.abs().max((low + size).abs())
+}
+
 /// A visible point of albedo π on an object, seen from +z.
 pub fn visible_point(position: [f32; 3], object: u32) -> VisiblePoint {
     let normal = f32::from_bits(cpu::encode_direction(DVec3::Z));
@@ -262,7 +281,7 @@ pub fn photon(position: [f32; 3], object: u32, flux: [f32; 3]) -> Photon {
 /// `count` numbers in [0, 1) in sets of four, the same in every run.
 pub fn random_numbers(count: u32) -> impl Iterator<Item = [f32; 4]> {
     (0..count).map(|i| {
-        cpu::Random::new(cpu::PathKind::Camera, i, 0, 0xbe9c)
+        Random::new(PathKind::Camera, i, 0, 0xbe9c)
             .next4()
             .map(|number| number as f32)
     })

@@ -1,15 +1,15 @@
 //! The stage `coverage`.
 
-use bytemuck::Zeroable;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
-use ppm_vk::layout::{Coverage, Gathered, Statistics, VisiblePoint};
+use ppm_vk::layout::{COVERAGE_WHOLE, Coverage, Statistics, VisiblePoint};
+use ppm_vk::random::Random;
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::agreement::Agreement;
-use super::bench::{Bench, small, visible_point};
+use super::bench::{Bench, object, reach_of, small, visible_point, xyz};
 
 /// What the first iteration of the stage finds at these points with these radii.
 fn on_device(bench: &mut Bench, points: &[VisiblePoint], radii2: &[f32], statistics: &[Statistics]) -> Vec<Coverage> {
@@ -51,24 +51,54 @@ fn points_can_have_photons_where_the_cpu_says_so() {
             (statistics.accepted_low, statistics.accepted_high) = (0, 0);
         }
         let found = on_device(&mut bench, &points, &radii2, &statistics);
-        let mut expected = vec![Coverage::zeroed(); radii2.len()];
-        let photons = (statistics.as_slice(), &vec![Gathered::zeroed(); radii2.len()][..]);
-        cpu::coverage(&bench.inputs(), 0, &points, &radii2, photons, &mut expected);
+        let inputs = bench.inputs();
         let mut agreement = Agreement::default();
-        for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
-            assert_eq!(found.asked, expected.asked, "{name}, slot {slot}: asked");
-            agreement.note(found == expected, || {
-                format!("slot {slot}: {found:?} on the device, {expected:?} on the CPU")
+        let (mut surrounded, mut partly) = (0, 0);
+        for (receiver, found) in found.iter().enumerate() {
+            let slot = receiver % points.len();
+            let Some(object) = object(points[slot].position_object) else {
+                continue;
+            };
+            let normal = cpu::decode_direction(points[slot].weight_normal[3].to_bits());
+            let reach = reach_of(&bench.scene, object);
+            let place = cpu::Place {
+                origin: cpu::offset_origin(xyz(points[slot].position_object), normal, reach),
+                normal,
+                object,
+            };
+            let random = Random::of_disc(&bench.config, slot as u32, 0, COVERAGE_WHOLE);
+            let has_photons = statistics[receiver].accepted() > 0;
+            assert_eq!(
+                found.asked,
+                if has_photons { COVERAGE_WHOLE } else { 0 },
+                "{name}, {receiver}"
+            );
+            let covered = (0..found.asked).filter(|&number| {
+                let [u, v, ..] = random.sample_of(number, COVERAGE_WHOLE).next4();
+                cpu::can_have_photons(&inputs, place, f64::from(radii2[receiver]).sqrt(), [u, v])
             });
+            let covered = covered.count() as u32;
+            agreement.note(found.covered == covered, || {
+                format!("receiver {receiver}: {found:?} on the device, {covered} covered on the CPU")
+            });
+            if found.surrounded > 0 || (receiver < points.len() && !has_photons) {
+                let mut behind = random;
+                behind.skip_to(COVERAGE_WHOLE);
+                let [u, v, ..] = behind.next4();
+                let is_surrounded = cpu::is_surrounded(&inputs, place, [u, v]);
+                // A caustic photon says that it isn't in the open.
+                let asks =
+                    receiver + points.len() >= statistics.len() || statistics[receiver + points.len()].accepted() == 0;
+                agreement.note(!asks || (found.surrounded > 0) == is_surrounded, || {
+                    format!("receiver {receiver}: {found:?} on the device, surrounded on the CPU: {is_surrounded}")
+                });
+            }
+            surrounded += u32::from(found.surrounded > 0);
+            partly += u32::from(found.covered < found.asked);
         }
         // A point next to an edge lies on either side by rounding.
         agreement.assert(&format!("coverage in {name}"), 0.99, 2000);
-        let surrounded = expected.iter().filter(|coverage| coverage.surrounded > 0).count();
         assert!(surrounded > 500, "{name}: only {surrounded} points are surrounded");
-        let partly = expected
-            .iter()
-            .filter(|coverage| coverage.covered < coverage.asked)
-            .count();
         assert!(partly > 20, "{name}: only {partly} discs reach past an edge");
     }
 }
@@ -104,7 +134,7 @@ fn discs_that_reach_past_a_wall_are_covered_by_their_part_before_it() {
         // As many discs as can have had photons.
         let lit = Statistics {
             accepted_low: 1,
-            ..cpu::reset(radius * radius)
+            ..Statistics::of_radius2(radius * radius)
         };
         let (points, radii2) = (vec![point; count], vec![radius * radius; count]);
         let found = on_device(&mut bench, &points, &radii2, &vec![lit; count]);

@@ -1,11 +1,10 @@
 //! The gather methods: every one finds the same photons, N and M exactly, as testing each photon on the CPU.
 
-use bytemuck::Zeroable;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
-use ppm_vk::cpu::{self, Counts, GatheredWith, Seen};
+use ppm_vk::cpu;
 use ppm_vk::gather::{self, METHODS};
-use ppm_vk::layout::{Coverage, Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
+use ppm_vk::layout::{Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
 use ppm_vk::packing::PackedScene;
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
@@ -13,11 +12,11 @@ use ppm_vk::sizes::Probe;
 use ppm_vk::stage::{BufferId, StageDesc};
 
 use super::agreement::relative_difference;
-use super::bench::{Bench, photon, random_numbers, small, visible_point, xyz};
+use super::bench::{Bench, Seen, photon, random_numbers, small, visible_point, xyz};
 
 /// Statistics with a radius for all visible points, in each photon map.
 fn with_radius(bench: &Bench, radius2: f32) -> Vec<Statistics> {
-    vec![cpu::reset(radius2); bench.renderer.sizes().receivers() as usize]
+    vec![Statistics::of_radius2(radius2); bench.renderer.sizes().receivers() as usize]
 }
 
 /// R² of each.
@@ -38,13 +37,9 @@ fn assert_methods_agree(
     statistics: &[Statistics],
     photons: &[Photon],
 ) -> Vec<u32> {
-    let gloss = Vec::new();
-    let points = points.to_vec();
-    let footprints = Vec::new();
     let seen = Seen {
-        points,
-        gloss,
-        footprints,
+        points: points.to_vec(),
+        gloss: Vec::new(),
     };
     assert_methods_agree_on(bench, case, &seen, statistics, photons)
 }
@@ -67,22 +62,14 @@ fn assert_methods_agree_on(
         "more photons than the buffers hold"
     );
     let radii2 = radii2(statistics);
-    let mut expected = vec![Gathered::zeroed(); radii2.len()];
-    cpu::gather_naive(seen, &radii2, photons, &mut expected);
-    let mut updated = statistics.to_vec();
-    cpu::update(
-        points,
-        GatheredWith {
-            radii2: &radii2,
-            coverage: &vec![Coverage::zeroed(); radii2.len()],
-            photons: bench.config.photons,
-            alpha: bench.config.alpha,
-        },
-        &Counts::default(),
-        &mut expected.clone(),
-        &mut updated,
-        &mut vec![[0.0; 4]; points.len()],
-    );
+    let expected = cpu::gather_naive(&seen.with(&radii2), photons);
+    let update = |(index, (gathered, before)): (usize, (&cpu::Gathered, &Statistics))| {
+        let mut statistics = cpu::Statistics::from(before);
+        let flux = xyz(points[index % points.len()].weight_normal) * gathered.flux;
+        statistics.take(gathered.count, flux, bench.config.alpha.into());
+        statistics
+    };
+    let updated: Vec<_> = expected.iter().zip(statistics).enumerate().map(update).collect();
 
     bench.upload(BufferId::VisiblePoints, points);
     if !seen.gloss.is_empty() {
@@ -119,15 +106,16 @@ fn assert_methods_agree_on(
         let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
         assert_same_statistics(&what, &found, &updated);
     }
-    counts(&expected)
+    expected.iter().map(|gathered| gathered.count).collect()
 }
 
-fn assert_same_photons(what: &str, found: &[Gathered], expected: &[Gathered]) {
-    for (slot, (found, expected)) in counts(found).iter().zip(counts(expected)).enumerate() {
-        assert_eq!(*found, expected, "{what}, slot {slot}: M on the device, M on the CPU");
+fn assert_same_photons(what: &str, found: &[Gathered], expected: &[cpu::Gathered]) {
+    for (slot, (found, expected)) in found.iter().zip(expected).enumerate() {
+        let counts = (found.count, expected.count);
+        assert_eq!(counts.0, counts.1, "{what}, slot {slot}: M on the device, M on the CPU");
     }
     for (slot, (found, expected)) in found.iter().zip(expected).enumerate() {
-        let (found, expected) = (found.moment.into(), expected.moment.into());
+        let (found, expected) = (found.moment.into(), expected.moment);
         assert!(
             relative_difference(found, expected) <= 5e-5,
             "{what}, slot {slot}: moment {found} on the device, {expected} on the CPU"
@@ -135,23 +123,28 @@ fn assert_same_photons(what: &str, found: &[Gathered], expected: &[Gathered]) {
     }
 }
 
-fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[Statistics]) {
+fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[cpu::Statistics]) {
     for (slot, (found, expected)) in found.iter().zip(expected).enumerate() {
-        let accepted = |s: &Statistics| (s.accepted_low, s.accepted_high);
+        let found = cpu::Statistics::from(found);
         assert_eq!(
-            accepted(found),
-            accepted(expected),
+            found.accepted, expected.accepted,
             "{what}, slot {slot}: photons accepted"
         );
         // Sums of f32, added up in another order: √M roundings.
-        let (tau, expected_tau) = (xyz(found.flux_high), xyz(expected.flux_high));
-        for (tau, expected) in tau.to_array().into_iter().zip(expected_tau.to_array()) {
+        for (tau, expected) in found.flux.to_array().into_iter().zip(expected.flux.to_array()) {
             let difference = relative_difference(tau, expected);
             assert!(
                 difference <= 1e-5,
                 "{what}, slot {slot}: τ {tau} on the device, {expected} on the CPU"
             );
         }
+        let difference = relative_difference(found.radius2, expected.radius2);
+        assert!(
+            difference <= 1e-6,
+            "{what}, slot {slot}: R² {} on the device, {} on the CPU",
+            found.radius2,
+            expected.radius2
+        );
     }
 }
 
@@ -260,7 +253,7 @@ fn all_methods_agree_where_radii_differ() {
     let (points, photons): (Vec<VisiblePoint>, _) = (bench.download(BufferId::VisiblePoints), bench.photons());
     let radius = bench.renderer.radius();
     let statistics: Vec<Statistics> = random_numbers(bench.renderer.sizes().receivers())
-        .map(|[u, ..]| cpu::reset((radius * 4f32.powf(2.0 * u - 1.0)).powi(2)))
+        .map(|[u, ..]| Statistics::of_radius2((radius * 4f32.powf(2.0 * u - 1.0)).powi(2)))
         .collect();
     assert_methods_agree(
         &mut bench,

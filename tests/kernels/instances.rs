@@ -119,11 +119,9 @@ fn rays_meet_instances_as_they_meet_meshes_of_their_own() {
         let config = RenderConfig { accel, ..small() };
         let settings: Settings = bytemuck::Zeroable::zeroed();
         let inputs = cpu::Inputs {
-            demand: None,
             scene: &scene,
             settings: &settings,
             config: &config,
-            emission: None,
         };
         let found = rays.iter().map(|[origin, direction]| {
             let ray = cpu::Ray {

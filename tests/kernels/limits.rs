@@ -4,10 +4,11 @@
 use glam::DVec3;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Accel, Direct, EmissionChoice, RenderConfig};
-use ppm_vk::cpu::{self, Batch, CameraTurn, Counts};
+use ppm_vk::cpu;
 use ppm_vk::gpu::Device;
 use ppm_vk::layout::{DirectSum, Statistics, VisiblePoint};
 use ppm_vk::pipeline::Renderer;
+use ppm_vk::random::CameraTurn;
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, StageDesc};
@@ -21,25 +22,20 @@ fn no_photon_is_lost_where_a_lane_follows_many_paths() {
         resolution: [8, 8],
         photons: 400_000,
         radius: Some(0.01),
+        drop_unwanted: false,
+        emission: EmissionChoice::Power,
         ..small()
     };
     let bench = Bench::new("pool", config);
-    let batch = Batch {
-        iteration: 0,
-        first_path: 0,
-        paths: bench.config.photons,
-    };
-    let expected = cpu::photons(&bench.inputs(), batch, &Counts::default())
-        .lanes
-        .iter()
-        .map(Vec::len)
-        .sum::<usize>();
     let counters = bench.renderer.counters();
-    println!("{expected} photons on the CPU, on the device {counters:?}");
     assert_eq!(counters.cut_paths, 0, "paths that were cut short");
+    let expected = bench.plain().trace_photon_paths(0, 0..bench.config.photons).0.len();
+    println!("{expected} photons on the CPU, on the device {counters:?}");
+    // Numbers of photons of a path have a standard deviation below twice their mean: 0.45 % of a difference of two such means. Six of
+    // those fail a right program once in 10⁸ times.
     let difference = relative_difference(counters.photons_stored as f64, expected as f64);
     assert!(
-        difference < 1e-3,
+        difference < 0.027,
         "{expected} photons on the CPU, on the device {counters:?}"
     );
 }

@@ -1,24 +1,22 @@
-//! The CPU's stages against each other and against what is known.
+//! The CPU's functions against each other and against what is known.
 
-use bytemuck::Zeroable;
 use glam::DVec3;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Accel, Direct, RenderConfig};
-use ppm_vk::cpu::{self, Batch, Counts, Inputs, Ray, Renderer};
+use ppm_vk::cpu::{self, Inputs, Ray, Renderer, SeenByKernels};
 use ppm_vk::film::Image;
-use ppm_vk::layout::{Gathered, Settings};
+use ppm_vk::layout::{Settings, VisiblePoint};
 use ppm_vk::metrics;
 use ppm_vk::packing::PackedScene;
+use ppm_vk::random::CameraTurn;
 
-use super::bench::{packed, random_numbers, scene, small};
+use super::bench::{Bench, packed, random_numbers, scene, small, visible_point};
 
 fn inputs<'a>(scene: &'a PackedScene, settings: &'a Settings, config: &'a RenderConfig) -> Inputs<'a> {
     Inputs {
         scene,
         settings,
         config,
-        demand: None,
-        emission: None,
     }
 }
 
@@ -58,13 +56,8 @@ fn the_hierarchy_finds_the_hits_that_testing_every_triangle_finds() {
             if let Some(hit) = expected {
                 hits += 1;
                 for limit in [0.5 * hit.t, hit.t, 1.5 * hit.t] {
-                    let blocked = cpu::is_blocked(&bvh, ray, limit, None);
-                    assert_eq!(
-                        blocked,
-                        cpu::is_blocked(&brute, ray, limit, None),
-                        "{name}: {ray:?} before {limit}"
-                    );
-                    assert_eq!(blocked, limit > hit.t, "{name}: {ray:?} before {limit}");
+                    let before = cpu::nearest_hit(&bvh, ray, limit, None);
+                    assert_eq!(before.is_some(), limit > hit.t, "{name}: {ray:?} before {limit}");
                 }
             }
         }
@@ -87,32 +80,44 @@ fn no_ray_leaves_a_closed_room() {
 
 #[test]
 fn the_kd_tree_finds_what_testing_every_photon_finds() {
-    let scene = packed(&scene("cornell-spheres"));
-    let loaded = super::bench::scene("cornell-spheres");
-    let config = small();
-    let renderer = Renderer::new(&scene, &loaded.cameras[0], config.clone()).expect("a renderer");
-    let inputs = inputs(&scene, renderer.settings(), &config);
-    let counts = Counts::default();
-    let points = cpu::camera(&inputs, cpu::CameraTurn::FIRST, &counts).points;
-    let batch = Batch {
-        iteration: 0,
-        first_path: 0,
-        paths: config.photons,
-    };
-    let photons = cpu::compact(&cpu::photons(&inputs, batch, &counts).lanes);
+    let bench = Bench::new("cornell-spheres", small());
+    let plain = bench.plain();
+    let paths = plain.trace_camera_paths(CameraTurn::FIRST);
+    let points: Vec<VisiblePoint> = paths
+        .iter()
+        .flat_map(|path| &path.points)
+        .map(|point| {
+            let [x, y, z] = point.surface.position.as_vec3().to_array();
+            let mut of_kernels = visible_point([x, y, z], point.surface.object);
+            of_kernels.weight_normal[3] = f32::from_bits(cpu::encode_direction(point.bsdf.normals().geometric));
+            of_kernels
+        })
+        .collect();
+    let (photons, _) = plain.trace_photon_paths(0, 0..bench.config.photons);
     for radius in [0.2, 1.0, 5.0] {
-        let radii2 = vec![(radius * renderer.radius()).powi(2); 2 * points.len()];
-        let nothing = vec![Gathered::zeroed(); radii2.len()];
-        let (mut found, mut expected) = (nothing.clone(), nothing);
-        cpu::gather_kd_tree(&points, &radii2, &photons, &mut found).expect("few photons");
-        cpu::gather_naive(&points, &radii2, &photons, &mut expected);
-        let differing = found
-            .iter()
-            .zip(&expected)
-            .position(|(a, b)| bytemuck::bytes_of(a) != bytemuck::bytes_of(b));
+        let radii2 = vec![(radius * plain.radius()).powi(2); points.len()];
+        let seen = SeenByKernels {
+            points: &points,
+            gloss: &[],
+            radii2: &radii2,
+        };
+        let found = cpu::gather_kd_tree(&seen, &photons).expect("few photons");
+        let expected = cpu::gather_naive(&seen, &photons);
+        let differing = found.iter().zip(&expected).position(|(a, b)| a.count != b.count);
         assert_eq!(
             differing, None,
             "slot that differs at {radius} times the automatic radius"
+        );
+        // Sums of f64 in another order.
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!(
+                (found.flux - expected.flux).length() <= 1e-12 * expected.flux.length(),
+                "{found:?}"
+            );
+        }
+        assert!(
+            expected.iter().any(|gathered| gathered.count > 0),
+            "nothing is gathered at {radius}"
         );
     }
 }

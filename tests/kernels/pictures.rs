@@ -1,116 +1,138 @@
-//! Whole pictures of both backends.
+//! Pictures by kernels and by the plain renderer: two programs that share the scene's layout and the random numbers, and nothing
+//! else of how light is followed.
 
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, EmissionChoice, Estimator, RenderConfig};
-use ppm_vk::cpu;
-use ppm_vk::gpu::Device;
-use ppm_vk::layout::Statistics;
-use ppm_vk::metrics;
-use ppm_vk::pipeline;
-use ppm_vk::stage::BufferId;
+use ppm_vk::config::{Direct, Estimator, RenderConfig, SEQUENCES};
 
-use super::agreement::{Agreement, relative_difference};
-use super::bench::{Bench, packed, scene, small};
+use super::bench::{Bench, small};
 
-/// R of each slot.
-fn radii(statistics: &[Statistics]) -> Vec<f64> {
-    statistics.iter().map(|s| f64::from(s.radius2_high).sqrt()).collect()
+/// Samples of each number.
+const SAMPLES: u32 = 12;
+const SIDE: u32 = 32;
+/// Pixels of a block's side.
+const BLOCK: u32 = 8;
+
+/// Mean of each block and channel, and of all, in each picture.
+fn blocks(pixels: &[[f32; 4]]) -> Vec<f64> {
+    let across = SIDE / BLOCK;
+    let count = 3 * (across * across) as usize;
+    let mut sums = vec![0.0; count + 3];
+    for (pixel, rgb) in (0..).zip(pixels) {
+        let block = (pixel / SIDE / BLOCK * across + pixel % SIDE / BLOCK) as usize;
+        for channel in 0..3 {
+            let value = f64::from(rgb[channel]);
+            sums[3 * block + channel] += value / f64::from(BLOCK * BLOCK);
+            sums[count + channel] += value / f64::from(SIDE * SIDE);
+        }
+    }
+    sums
 }
 
-#[test]
-fn both_backends_choose_the_same_radii() {
-    for name in ["cornell-spheres", "pool"] {
-        let loaded = scene(name);
-        let scene = packed(&loaded);
-        let device = Device::open(None).expect("a Vulkan device");
-        let mut found = pipeline::Renderer::new(device, &scene, &loaded.cameras[0], small()).expect("a renderer");
-        let expected = cpu::Renderer::new(&scene, &loaded.cameras[0], small()).expect("a renderer");
-        let (radius, expected_radius) = (found.radius(), expected.radius());
-        // A photon that rounding sends elsewhere moves the median of the distances by a rank.
-        assert!(
-            (radius / expected_radius - 1.0).abs() < 5e-3,
-            "{name}: radius {radius}, {expected_radius} on the CPU"
-        );
-        let statistics = found.gpu().download(BufferId::StatisticsOf, None).expect("a download");
-        let mut agreement = Agreement::default();
-        for (slot, (found, expected)) in radii(&statistics)
-            .into_iter()
-            .zip(radii(expected.statistics()))
-            .enumerate()
-        {
-            // A photon more or less among ten makes a difference of a twentieth.
-            agreement.note(relative_difference(found, expected) < 0.06, || {
-                format!("slot {slot}: {found} on the device, {expected} on the CPU")
-            });
-        }
-        agreement.assert(&format!("radii in {name}"), 0.99, 4096);
+/// Of a render, the pictures of its sequences, which are independent of each other unless their visible points are the same.
+fn samples(renderer: &mut dyn Backend, estimator: Estimator) -> Vec<Vec<f64>> {
+    while renderer.iterations() < 16 {
+        renderer.iterate().expect("an iteration");
+    }
+    let resolved = renderer.resolve_all().expect("a picture");
+    assert_eq!(renderer.counters().non_finite, 0);
+    if estimator == Estimator::Sppm {
+        resolved.sequences.chunks((SIDE * SIDE) as usize).map(blocks).collect()
+    } else {
+        let pixels: Vec<_> = resolved
+            .image
+            .pixels()
+            .iter()
+            .map(|&[r, g, b]| [r, g, b, 0.0])
+            .collect();
+        vec![blocks(&pixels)]
     }
 }
 
+/// Mean and variance of the mean.
+fn mean_of(samples: &[f64]) -> (f64, f64) {
+    let count = samples.len() as f64;
+    let mean = samples.iter().sum::<f64>() / count;
+    let squares: f64 = samples.iter().map(|sample| (sample - mean).powi(2)).sum();
+    (mean, squares / (count * (count - 1.0)))
+}
+
+/// A difference of means of 12 samples exceeds 7.5 of its standard errors with a probability of 2·10⁻⁷ (Student, 22 degrees of
+/// freedom): 51 numbers of each of 20 cases fail a right pair of programs once in 5,000 runs. What radii blur is alike but for
+/// their number of maps: half a hundredth of a block, which is taken off, and three thousandths of the whole picture.
 #[test]
-fn both_backends_render_the_same_picture() {
-    for (name, estimator, direct) in [
-        ("cornell-spheres", Estimator::Sppm, Direct::Light),
-        ("cornell-spheres", Estimator::Ppm, Direct::Photons),
-        ("pool", Estimator::Sppm, Direct::Light),
-        ("glossy", Estimator::Sppm, Direct::Light),
-        ("glossy", Estimator::Ppm, Direct::Photons),
-        ("glasses", Estimator::Sppm, Direct::Light),
-        ("coats", Estimator::Sppm, Direct::Light),
-        ("coats", Estimator::Ppm, Direct::Photons),
-        ("textures", Estimator::Sppm, Direct::Light),
-        ("textures", Estimator::Ppm, Direct::Photons),
-        ("instances", Estimator::Sppm, Direct::Light),
-        ("glossy, lit", Estimator::Sppm, Direct::Light),
-        ("glossy, patterned", Estimator::Sppm, Direct::Light),
-        ("ring, lit", Estimator::Ppm, Direct::Photons),
+fn both_renderers_converge_to_the_same_picture() {
+    const STUDENT: f64 = 7.5;
+    for (name, estimator, direct, max_depth) in [
+        ("cornell-spheres", Estimator::Sppm, Direct::Light, 128),
+        ("cornell-spheres", Estimator::Ppm, Direct::Photons, 128),
+        ("pool", Estimator::Sppm, Direct::Light, 128),
+        ("glossy", Estimator::Sppm, Direct::Light, 128),
+        ("glasses", Estimator::Sppm, Direct::Light, 128),
+        ("coats", Estimator::Sppm, Direct::Light, 128),
+        ("coats", Estimator::Sppm, Direct::Photons, 128),
+        ("textures", Estimator::Sppm, Direct::Light, 128),
+        ("textures", Estimator::Sppm, Direct::Photons, 128),
+        ("instances", Estimator::Sppm, Direct::Light, 128),
+        ("ring", Estimator::Sppm, Direct::Light, 128),
+        ("glossy, lit", Estimator::Sppm, Direct::Light, 128),
+        ("glossy, softly lit", Estimator::Sppm, Direct::Light, 128),
+        ("glossy, patterned", Estimator::Sppm, Direct::Light, 128),
+        ("glasses, lit", Estimator::Sppm, Direct::Light, 128),
+        ("glasses, softly lit", Estimator::Sppm, Direct::Light, 128),
+        // One bounce: direct light alone, without the photons' noise.
+        ("many-lamps", Estimator::Sppm, Direct::Light, 1),
+        ("glossy, lit", Estimator::Sppm, Direct::Light, 1),
+        ("glossy, patterned", Estimator::Sppm, Direct::Light, 1),
+        ("plaza, lit", Estimator::Sppm, Direct::Light, 1),
     ] {
-        let config = RenderConfig {
-            estimator,
-            direct,
-            // Of an odd height: see the camera's test of split paths.
-            resolution: [64, 63],
-            radius: Some(0.05),
-            // What is learned on the device from a path that rounding sends another way aims others.
-            emission: EmissionChoice::Power,
-            ..small()
+        let what = format!("{name}, {estimator:?}, direct light from {direct:?}, {max_depth} bounces");
+        let (mut found, mut expected) = (Vec::new(), Vec::new());
+        let seeds = if estimator == Estimator::Sppm {
+            SAMPLES / SEQUENCES
+        } else {
+            SAMPLES
         };
-        let mut bench = Bench::new(name, config.clone());
-        let loaded = scene(name);
-        let mut renderer = cpu::Renderer::new(&bench.scene, &loaded.cameras[0], config).expect("a renderer");
-        renderer.iterate().expect("an iteration");
-        for _ in 1..4 {
-            bench.renderer.iterate().expect("an iteration");
-            renderer.iterate().expect("an iteration");
+        for seed in 0..seeds {
+            let config = RenderConfig {
+                estimator,
+                direct,
+                resolution: [SIDE; 2],
+                photons: 10_000,
+                radius: Some(0.05),
+                max_depth,
+                seed,
+                ..small()
+            };
+            let mut bench = Bench::new(name, config);
+            found.extend(samples(&mut bench.renderer, estimator));
+            expected.extend(samples(&mut bench.plain(), estimator));
         }
-        let what = format!("{name}, {estimator:?}, direct light from {direct:?}");
-        assert_eq!(renderer.iterations(), bench.renderer.iterations(), "{what}");
-        assert_eq!(renderer.emitted(), bench.renderer.emitted(), "{what}");
-
-        let accepted = |statistics: &[Statistics]| statistics.iter().map(|s| f64::from(s.accepted_low)).sum::<f64>();
-        let found = accepted(&bench.download(BufferId::StatisticsOf));
-        let expected = accepted(renderer.statistics());
-        assert!(
-            (found / expected - 1.0).abs() < 1e-3,
-            "{what}: {found} photons accepted, {expected} on the CPU"
-        );
-
-        let expected = renderer.resolve().expect("a picture");
-        let found = bench.renderer.resolve().expect("a picture");
-        let comparison = metrics::compare(&found, &expected).expect("pictures of one size");
-        println!(
-            "{what}: {comparison:?}, counters {:?} {:?}",
-            bench.renderer.counters(),
-            renderer.counters()
-        );
-        // The same paths: what differs is the few of them that rounding sends another way.
-        for ratio in comparison.mean_ratio {
-            assert!(
-                (ratio - 1.0).abs() < 1e-3,
-                "{what}: ratio of means {:?}",
-                comparison.mean_ratio
+        let count = found[0].len();
+        let (mut worst, mut worst_text) = (0.0, String::new());
+        for number in 0..count {
+            let of = |samples: &[Vec<f64>]| mean_of(&samples.iter().map(|sample| sample[number]).collect::<Vec<_>>());
+            let ((found, variance), (expected, expected_variance)) = (of(&found), of(&expected));
+            let is_whole = number >= count - 3;
+            let slack = if is_whole { 0.003 } else { 0.005 } * found.max(expected);
+            let error = (variance + expected_variance).sqrt();
+            let off = ((found - expected).abs() - slack).max(0.0) / error;
+            let place = if is_whole {
+                "the whole".to_owned()
+            } else {
+                format!("block {}", number / 3)
+            };
+            let text = format!(
+                "{place}, channel {}: {found} by kernels, {expected} plainly, ± {error}",
+                number % 3
             );
+            if is_whole {
+                println!("{what}: {text}");
+            }
+            if off >= worst {
+                (worst, worst_text) = (off, text);
+            }
         }
-        assert!(comparison.rel_mse < 1e-3, "{what}: relMSE {}", comparison.rel_mse);
+        println!("{what}: {worst:.1} standard errors at the most, {worst_text}");
+        assert!(worst < STUDENT, "{what}: {worst} standard errors, {worst_text}");
     }
 }

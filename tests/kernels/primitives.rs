@@ -1,9 +1,9 @@
 //! Prefix sums and sorting: exact.
 
-use ppm_vk::cpu;
 use ppm_vk::gather;
 use ppm_vk::gpu::Device;
 use ppm_vk::layout::{SCAN_BLOCK, SORT_TILE};
+use ppm_vk::random::pcg4d;
 use ppm_vk::record::Recording;
 use ppm_vk::sizes::SORT_DIGIT_BITS;
 use ppm_vk::stage::BufferId;
@@ -13,7 +13,7 @@ fn device() -> Device {
 }
 
 fn random_words(count: usize, seed: u32) -> Vec<u32> {
-    (0..count as u32).map(|i| cpu::pcg4d([i, seed, 0, 0])[0]).collect()
+    (0..count as u32).map(|i| pcg4d([i, seed, 0, 0])[0]).collect()
 }
 
 /// Index and values of the first difference.
@@ -37,8 +37,13 @@ fn assert_scans(device: &mut Device, numbers: Vec<u32>) {
     gather::scan(BufferId::Keys, count, &mut recording);
     device.run(&recording).expect("a run");
 
-    let mut expected = numbers;
-    let total = cpu::scan(&mut expected);
+    let mut total = 0u32;
+    let before = numbers.iter().map(|&number| {
+        let before = total;
+        total = total.wrapping_add(number);
+        before
+    });
+    let expected: Vec<u32> = before.collect();
     let found: Vec<u32> = device
         .download(BufferId::Keys, Some(expected.len()))
         .expect("a download");
@@ -101,8 +106,9 @@ fn assert_sorts(device: &mut Device, case: &str, keys: Vec<u32>, capacity: usize
     );
     device.run(&recording).expect("a run");
 
-    let (mut expected_keys, mut expected_values) = (keys, values);
-    cpu::sort(&mut expected_keys, &mut expected_values, bits);
+    let mut pairs: Vec<(u32, u32)> = keys.into_iter().zip(values).collect();
+    pairs.sort_by_key(|(key, _)| key & (u32::MAX >> (32 - bits)));
+    let (expected_keys, expected_values): (Vec<u32>, Vec<u32>) = pairs.into_iter().unzip();
     for (id, expected) in [(sorted.keys, expected_keys), (sorted.values, expected_values)] {
         let found: Vec<u32> = device.download(id, Some(capacity)).expect("a download");
         let difference = first_difference(&found[..count], &expected);

@@ -1,20 +1,23 @@
 //! The stages `reset`, `update` and `resolve`.
 
+use std::f64::consts::PI;
+
 use bytemuck::Zeroable;
+use glam::DVec3;
 use ppm_vk::backend::Backend;
-use ppm_vk::config::{Estimator, RenderConfig, Totals};
-use ppm_vk::cpu::{self, Counts, GatheredWith};
+use ppm_vk::config::{EmissionChoice, Estimator, RenderConfig, Totals, iterations_of, pixel_of};
+use ppm_vk::cpu;
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{
-    BehindGlass, Coverage, DirectSum, Gathered, GridShape, NO_OBJECT, Photon, Settings, ShellRadii, Statistics,
-    VisiblePoint,
+    CELLS_TO_RADIUS, Coverage, DirectSum, Gathered, GridShape, MOST_CELLS, NO_OBJECT, Photon, SHELLS, SMALLEST_CELL,
+    Settings, ShellRadii, Statistics, VisiblePoint,
 };
 use ppm_vk::record::Recording;
 use ppm_vk::shaders;
 use ppm_vk::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
 
 use super::agreement::{Agreement, relative_difference};
-use super::bench::{Bench, photon, random_numbers, scene, small, visible_point};
+use super::bench::{Bench, Seen, object, photon, random_numbers, small, visible_point, xyz};
 
 /// Values of 1e-6 relative: the device keeps two f32 of each, 48 bits, but rounds the factors of eq. 2 to f32.
 const TOLERANCE: f64 = 1e-6;
@@ -54,7 +57,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     for slot in 0..64 {
         photons.extend((0..arriving(slot)).map(|i| photon([0.0; 3], slot, [1.0, 0.1 + i as f32, 1e-3])));
     }
-    let mut statistics = vec![cpu::reset(0.01); 64];
+    let mut statistics = vec![Statistics::of_radius2(0.01); 64];
     for (slot, statistics) in statistics.iter_mut().enumerate() {
         // What came before: nothing, or so much that one photon changes less than the precision of an f32.
         let before: u64 = [0, 100_000_000, u64::from(u32::MAX) - 5][slot / 6 % 3];
@@ -84,26 +87,17 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
 
     let before = statistics.clone();
-    let mut expected = statistics;
-    let mut gathered = vec![Gathered::zeroed(); 64];
-    let coverage = vec![Coverage::zeroed(); 64];
-    let mut sums = vec![[0.0; 4]; 64];
-    for _ in 0..ITERATIONS {
-        let radii2: Vec<f32> = expected.iter().map(|s: &Statistics| s.radius2_high).collect();
-        cpu::gather_naive(&points, &radii2, &photons, &mut gathered);
-        cpu::update(
-            &points,
-            GatheredWith {
-                radii2: &radii2,
-                coverage: &coverage,
-                photons: 1,
-                alpha: bench.config.alpha,
-            },
-            &Counts::default(),
-            &mut gathered,
-            &mut expected,
-            &mut sums,
-        );
+    let mut expected: Vec<_> = statistics.iter().map(cpu::Statistics::from).collect();
+    let radii2 = vec![0.01; 64];
+    let seen = Seen {
+        points,
+        gloss: Vec::new(),
+    };
+    let of_iteration = cpu::gather_naive(&seen.with(&radii2), &photons);
+    for (expected, gathered) in expected.iter_mut().zip(&of_iteration) {
+        for _ in 0..ITERATIONS {
+            expected.take(gathered.count, gathered.flux, bench.config.alpha.into());
+        }
     }
     for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
         let m = arriving(slot as u32);
@@ -115,13 +109,13 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
             accepted(&before[slot]) + u64::from(m * ITERATIONS),
             "slot {slot}: accepted"
         );
-        let difference = relative_difference(radius2(found), radius2(expected));
+        let found = cpu::Statistics::from(found);
+        let difference = relative_difference(found.radius2, expected.radius2);
         assert!(
             difference < TOLERANCE,
             "slot {slot}, M = {m}: R² off by {difference:e}: {found:?}, {expected:?}"
         );
-        let tau = |s: &Statistics| [0, 1, 2, 3].map(|i| f64::from(s.flux_high[i]) + f64::from(s.flux_low[i]));
-        for (found, expected) in tau(found).into_iter().zip(tau(expected)) {
+        for (found, expected) in found.flux.to_array().into_iter().zip(expected.flux.to_array()) {
             let difference = relative_difference(found, expected);
             assert!(
                 difference < TOLERANCE,
@@ -156,7 +150,7 @@ fn radii_shrink_where_more_photons_than_wanted_were_found_but_not_below_a_part_o
         })
         .collect();
     let numbers: Vec<[f32; 4]> = random_numbers(receivers).collect();
-    let statistics: Vec<Statistics> = numbers.iter().map(|[u, ..]| cpu::reset(0.01 + u)).collect();
+    let statistics: Vec<Statistics> = numbers.iter().map(|[u, ..]| Statistics::of_radius2(0.01 + u)).collect();
     let footprints: Vec<f32> = numbers[..64].iter().map(|[_, v, ..]| 0.1 * v).collect();
     bench.upload(BufferId::GatheredOf, &gathered);
     bench.upload(BufferId::StatisticsOf, &statistics);
@@ -166,17 +160,8 @@ fn radii_shrink_where_more_photons_than_wanted_were_found_but_not_below_a_part_o
     recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, receivers).push(push));
     bench.renderer.run(&recording).expect("a run");
 
-    let mut expected = statistics.clone();
-    cpu::fit_radius(wanted, least, &footprints, &mut gathered.clone(), &mut expected);
     let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
-    for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        let difference = relative_difference(radius2(found), radius2(expected));
-        assert!(
-            difference < TOLERANCE,
-            "receiver {i}: R² {}, {} on the CPU",
-            radius2(found),
-            radius2(expected)
-        );
+    for (i, found) in found.iter().enumerate() {
         let before = radius2(&statistics[i]);
         let shrunk = before * (f64::from(wanted[i / 64]) / (i * i) as f64).min(1.0);
         let by_hand = shrunk.max(before.min((0.5 * f64::from(footprints[i % 64])).powi(2)));
@@ -200,7 +185,7 @@ fn discs_follow_footprints_and_are_counted_in_their_shells() {
     let receivers = bench.renderer.sizes().receivers();
     // Some slots see something for the first time, some have discs that are too large here.
     let statistics: Vec<Statistics> = random_numbers(receivers)
-        .map(|[u, v, ..]| cpu::reset(if u < 0.3 { 0.0 } else { 0.1 * v * v }))
+        .map(|[u, v, ..]| Statistics::of_radius2(if u < 0.3 { 0.0 } else { 0.1 * v * v }))
         .collect();
     bench.upload(BufferId::StatisticsOf, &statistics);
     let step = bench.renderer.sizes().radius_step();
@@ -211,44 +196,71 @@ fn discs_follow_footprints_and_are_counted_in_their_shells() {
     recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup));
     bench.renderer.run(&recording).expect("radii");
 
-    let mut expected_statistics = statistics;
-    let expected = cpu::radii(&bench.settings, &seen, &mut expected_statistics);
+    let footprints: Vec<f32> = bench.download(BufferId::Footprints);
     let found: Vec<f32> = bench.download(BufferId::Radii2);
-    for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        let difference = relative_difference((*found).into(), (*expected).into());
-        assert!(difference < 1e-6, "receiver {i}: R² {found}, {expected} on the CPU");
-    }
     let set: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
-    for (i, (found, expected)) in set.iter().zip(&expected_statistics).enumerate() {
-        let difference = relative_difference(radius2(found), radius2(expected));
-        assert!(difference < 1e-6, "receiver {i}: {found:?}, {expected:?} on the CPU");
+    let slots = seen.points.len();
+    // Of each shell, the logarithms of every step-th R, their number, and the largest R².
+    let mut expected = vec![(0.0, 0, 0f32); 2 * SHELLS];
+    for i in 0..receivers as usize {
+        let (map, slot, before) = (i / slots, i % slots, f64::from(statistics[i].radius2_high));
+        let Some(_) = object(seen.points[slot].position_object) else {
+            continue;
+        };
+        let of_footprints = |count: f32| (f64::from(count) * f64::from(footprints[slot])).powi(2);
+        let first = of_footprints(bench.settings.first_footprints[map]);
+        let radius2 = if before == 0.0 { first } else { before };
+        let disc = radius2.min(of_footprints(bench.settings.most_footprints[map]));
+        for (found, expected, what) in [(found[i], disc, "disc"), (set[i].radius2_high, radius2, "R²")] {
+            let difference = relative_difference(found.into(), expected);
+            assert!(difference < 1e-6, "receiver {i}, {what}: {found}, {expected} expected");
+        }
+        let distance = xyz(seen.points[slot].position_object).distance(xyz(bench.settings.camera_position));
+        // Shells end at 2^-12, 2^-10, …, 2^2.
+        let shell = |distance: f64| {
+            ((2.0 * distance.max(1e-30).log2()).floor() as i32 + 28)
+                .div_euclid(4)
+                .clamp(0, 7) as usize
+        };
+        let radius = f64::from(found[i]).sqrt();
+        for shell in shell(distance - radius)..=shell(distance + radius) {
+            let largest = &mut expected[map * SHELLS + shell].2;
+            *largest = largest.max(found[i]);
+        }
+        if i % step as usize == 0 {
+            let shell = &mut expected[map * SHELLS + shell(distance)];
+            (shell.0, shell.1) = (shell.0 + radius.log2(), shell.1 + 1);
+        }
     }
-    let expected = cpu::shell_radii(&bench.settings, &seen.points, &found, step);
-    let found: Vec<ShellRadii> = bench.download(BufferId::RadiiOfShells);
+    let shells: Vec<ShellRadii> = bench.download(BufferId::RadiiOfShells);
     let grid: Vec<GridShape> = bench.download(BufferId::Grid);
-    let shape = cpu::grid_shape(&found);
-    let mut shells = 0;
-    for (shell, (found, expected)) in found.iter().zip(&expected).enumerate() {
+    for (shell, (found, (logs, count, largest))) in shells.iter().zip(expected).enumerate() {
         assert_eq!(
-            (found.count, found.largest),
-            (expected.count, expected.largest),
+            (found.count, f32::from_bits(found.largest)),
+            (count, largest),
             "shell {shell}"
         );
-        // A step of rounding each.
+        let balanced = if count > 0 {
+            f64::from(CELLS_TO_RADIUS) * (logs / f64::from(count)).exp2()
+        } else {
+            0.0
+        };
+        let bounded = f64::from(largest).sqrt() / f64::from(MOST_CELLS);
+        let size = balanced.max(bounded).max(SMALLEST_CELL.into());
+        let found = f64::from(grid[0].inverse_cell_size[shell]);
+        // Logarithms are counted in parts of 256, each rounded.
         assert!(
-            found.logs.abs_diff(expected.logs) <= found.count,
-            "shell {shell}: {found:?}, {expected:?}"
+            (found * size - 1.0).abs() < 2e-3,
+            "shell {shell}: 1/s {found}, s {size} expected"
         );
-        shells += u32::from(found.count > 0);
-        let (found, expected) = (grid[0].inverse_cell_size[shell], shape.inverse_cell_size[shell]);
-        let difference = relative_difference(found.into(), expected.into());
-        assert!(difference < 1e-5, "shell {shell}: 1/s {found}, {expected} on the CPU");
     }
-    assert!(shells >= 2, "one for each photon map at the least: {found:?}");
+    let used = shells.iter().filter(|shell| shell.count > 0).count();
+    assert!(used >= 2, "one for each photon map at the least: {shells:?}");
 }
 
+/// What a cell has is what one of the visible points wants, and of all of them the most that any wants is among that.
 #[test]
-fn what_visible_points_want_of_photons_is_what_the_cpu_says() {
+fn cells_want_photons_as_the_visible_points_do_that_reach_them() {
     for name in ["cornell-spheres", "glossy", "pool"] {
         let mut bench = Bench::new(name, small());
         for _ in 0..3 {
@@ -263,32 +275,83 @@ fn what_visible_points_want_of_photons_is_what_the_cpu_says() {
         recording.dispatch(StageDesc::new(&shaders::DEMAND, receivers).push(push));
         bench.renderer.run(&recording).expect("demand");
         let found: Vec<f32> = bench.download(BufferId::Demand);
-        let settings: Vec<Settings> = bench.download(BufferId::Settings);
-        let (statistics, coverage) = (
-            bench.download(BufferId::StatisticsOf),
-            bench.download(BufferId::CoverageOf),
-        );
-        let direct_sums = bench.download(BufferId::DirectSums);
-        let progress = cpu::Progress {
-            statistics: &statistics,
-            coverage: &coverage,
-            direct_sums: &direct_sums,
-            iterations,
-            emitted,
-        };
+        let floor2 = f64::from(bench.download::<Settings>(BufferId::Settings)[0].demand_floor2);
+        let statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
+        let coverage: Vec<Coverage> = bench.download(BufferId::CoverageOf);
+        let direct: Vec<DirectSum> = bench.download(BufferId::DirectSums);
+        let footprints: Vec<f32> = bench.download(BufferId::Footprints);
         let (seen, radii2) = (bench.seen(), bench.download::<f32>(BufferId::Radii2));
-        let grid = bench.download::<GridShape>(BufferId::Grid)[0];
-        let expected = cpu::demand(&settings[0], &seen, &radii2, progress, grid);
+        let mean = |v: glam::DVec3| v.element_sum() / 3.0;
+        let slots = seen.points.len();
+        let share = |coverage: &Coverage| match coverage.covered {
+            0 => 1.0,
+            covered => f64::from(covered) / f64::from(coverage.asked),
+        };
+        let wants = |receiver: usize| {
+            let slot = receiver % slots;
+            object(seen.points[slot].position_object)?;
+            let by_photons = (slot..statistics.len()).step_by(slots);
+            let by_photons =
+                by_photons.map(|i| mean(cpu::Statistics::from(&statistics[i]).radiance(share(&coverage[i]), emitted)));
+            let radiance = mean(xyz(direct[slot].high)) / f64::from(iterations) + by_photons.sum::<f64>();
+            let (area, footprint) = (PI * f64::from(radii2[receiver]), f64::from(footprints[slot]));
+            let of_one = mean(xyz(seen.points[slot].weight_normal)) / area;
+            Some(of_one * of_one * area / (footprint * footprint) / (radiance * radiance + floor2))
+        };
+        let mut wanted: Vec<f64> = (0..receivers as usize).filter_map(wants).collect();
+        wanted.sort_unstable_by(f64::total_cmp);
         let mut agreement = Agreement::default();
-        for (entry, (found, expected)) in found.iter().zip(&expected.entries).enumerate() {
-            if *found > 0.0 || *expected > 0.0 {
-                let difference = relative_difference((*found).into(), (*expected).into());
-                agreement.note(difference < 1e-3, || {
-                    format!("entry {entry}: {found} on the device, {expected} on the CPU")
-                });
-            }
+        for &found in found.iter().filter(|&&found| found > 0.0) {
+            let at = wanted.partition_point(|&wanted| wanted < f64::from(found) * (1.0 - 1e-4));
+            let nearest = wanted.get(at).copied().unwrap_or(f64::INFINITY);
+            agreement.note(relative_difference(found.into(), nearest) < 2e-4, || {
+                format!("{found} in a cell, the nearest that is wanted is {nearest}")
+            });
         }
         agreement.assert(&format!("what is wanted in {name}"), 0.999, 90);
+        let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let (found, wanted) = (
+            most(&mut found.iter().map(|&found| found.into())),
+            most(&mut wanted.into_iter()),
+        );
+        assert!(
+            relative_difference(found, wanted) < 1e-4,
+            "{name}: {found} at the most, {wanted} wanted"
+        );
+    }
+}
+
+/// No disc has lost a photon where those that nobody wants are dropped.
+#[test]
+fn dropping_photons_that_nobody_wants_changes_nothing_that_is_gathered() {
+    for name in ["cornell-spheres", "pool", "instances"] {
+        let [all, wanted] = [false, true].map(|drop_unwanted| {
+            let config = RenderConfig {
+                drop_unwanted,
+                radius: Some(0.02),
+                emission: EmissionChoice::Power,
+                ..small()
+            };
+            let mut bench = Bench::new(name, config);
+            bench.renderer.iterate().expect("an iteration");
+            (
+                bench.download::<Statistics>(BufferId::StatisticsOf),
+                bench.renderer.counters().photons_stored,
+            )
+        });
+        assert!(
+            wanted.1 < all.1,
+            "{name}: {} of {} photons were stored",
+            wanted.1,
+            all.1
+        );
+        for (slot, (found, expected)) in wanted.0.iter().zip(&all.0).enumerate() {
+            assert_eq!(
+                found.accepted(),
+                expected.accepted(),
+                "{name}, slot {slot}: photons accepted"
+            );
+        }
     }
 }
 
@@ -318,7 +381,7 @@ fn pictures_are_resolved_by_equation_4() {
                 flux_high: [flux, flux * b, flux * c, 0.0],
                 flux_low: [flux * 1e-8, 0.0, 0.0, 0.0],
                 accepted_low: (3.0 * a) as u32,
-                ..cpu::reset(10f32.powf(-2.0 - 6.0 * d))
+                ..Statistics::of_radius2(10f32.powf(-2.0 - 6.0 * d))
             });
             direct_sums.push(DirectSum {
                 high: [d, 1e6 * c, b, if a < 0.7 { 3.0 * b } else { 0.0 }],
@@ -343,49 +406,96 @@ fn pictures_are_resolved_by_equation_4() {
         };
         let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
         let resolved = bench.renderer.resolve_all().expect("a picture");
-        let (expected, behind_glass, _) =
-            cpu::resolve(&bench.settings, &points, &statistics, &direct_sums, &coverage, totals);
-        for (pixel, (found, expected)) in resolved.image.pixels().iter().zip(&expected).enumerate() {
-            for channel in 0..3 {
-                let difference = relative_difference(found[channel].into(), expected[channel].into());
+        let slots_per_pixel = bench.settings.slots_per_pixel as usize;
+        let [width, _] = resolution.map(|side| side as usize);
+        let mut behind = 0;
+        for (pixel_slot, first) in (0..).zip((0..slots as usize).step_by(slots_per_pixel)) {
+            let Some([x, y]) = pixel_of(resolution, pixel_slot) else {
+                continue;
+            };
+            let pixel = y as usize * width + x as usize;
+            let of_pixel = first..first + slots_per_pixel;
+            let what = format!("{estimator:?}, pixel {x}, {y}");
+            let assert_within = |tolerance: f64, found: f64, expected: f64, what: String| {
+                let difference = relative_difference(found, expected);
                 assert!(
-                    difference < TOLERANCE,
-                    "{estimator:?}, pixel {pixel}: {found:?} on the device, {expected:?} on the CPU"
+                    difference < tolerance,
+                    "{what}: {found} on the device, {expected} expected"
                 );
+            };
+            let assert_near = |found, expected, what| assert_within(TOLERANCE, found, expected, what);
+            let assert_glass = |found, expected, what| assert_within(4.0 * TOLERANCE, found, expected, what);
+            let mut radiance = DVec3::ZERO;
+            let (mut met, mut unbent, mut arrived) = (0, 0.0, 0.0);
+            for slot in of_pixel.clone() {
+                let (direct, known) = (&direct_sums[slot], &coverage[slot]);
+                let share = if known.covered > 0 {
+                    f64::from(known.covered) / f64::from(known.asked)
+                } else {
+                    1.0
+                };
+                let by_photons = cpu::Statistics::from(&statistics[slot]).radiance(share, totals.emitted);
+                radiance += (xyz(direct.high) + xyz(direct.low)) / f64::from(iterations) + by_photons;
+                met = met.max(known.met);
+                arrived += by_photons.element_sum() / 3.0;
+                if direct.low[3] > 0.0 {
+                    unbent += f64::from(direct.high[3]) / f64::from(direct.low[3]);
+                }
             }
-            let (waits, alpha) = (resolved.waits[pixel], f64::from(resolved.alpha[pixel]));
-            assert_eq!(waits, expected[3] < 0.0, "{estimator:?}, pixel {pixel}: waits");
-            let difference = relative_difference(alpha, expected[3].abs().into());
-            assert!(
-                difference < TOLERANCE,
-                "{estimator:?}, pixel {pixel}: alpha {alpha}, not {}",
-                expected[3]
+            for (found, expected) in resolved.image.pixels()[pixel].iter().zip(radiance.to_array()) {
+                assert_near((*found).into(), expected, what.clone());
+            }
+            let alpha = f64::from(met) / f64::from(totals.camera_paths);
+            assert_near(resolved.alpha[pixel].into(), alpha, format!("{what}, alpha"));
+            let has_photons = of_pixel.clone().any(|slot| statistics[slot].accepted() > 0);
+            let surrounded = of_pixel.clone().any(|slot| coverage[slot].surrounded > 0);
+            assert_eq!(
+                resolved.waits[pixel],
+                surrounded && !has_photons && alpha > 0.0,
+                "{what}: waits"
             );
+            let glass = &resolved.behind_glass[pixel];
+            assert_glass(glass.unbent.into(), unbent, format!("{what}, unbent"));
+            assert_glass(glass.arrived.into(), arrived, format!("{what}, arrived"));
+            let shows = |slot: &usize| direct_sums[*slot].high[3] > 0.0 && direct_sums[*slot].low[3] > 0.0;
+            let shows: Vec<usize> = of_pixel
+                .filter(shows)
+                .filter(|&slot| object(points[slot].position_object).is_some())
+                .collect();
+            let most = |value: &dyn Fn(usize) -> f64| shows.iter().map(|&slot| value(slot)).fold(0.0, f64::max);
+            let width = |slot: usize| {
+                let distance = xyz(points[slot].position_object).distance(xyz(bench.settings.camera_position));
+                f64::from(bench.settings.pixel_spread) * distance
+            };
+            assert_glass(
+                glass.radius2.into(),
+                most(&|slot| radius2(&statistics[slot])),
+                format!("{what}, R²"),
+            );
+            let radius = most(&|slot| radius2(&statistics[slot]).sqrt() / width(slot));
+            assert_glass(glass.radius.into(), radius, format!("{what}, R"));
+            let photons = most(&|slot| statistics[slot].accepted() as f64);
+            assert_glass(glass.photons.into(), photons, format!("{what}, photons"));
+            behind += usize::from(!shows.is_empty());
         }
-        for (pixel, (found, expected)) in resolved.behind_glass.iter().zip(&behind_glass).enumerate() {
-            let values =
-                |glass: &BehindGlass| [glass.unbent, glass.arrived, glass.photons, glass.radius, glass.radius2];
-            for (found, expected) in values(found).into_iter().zip(values(expected)) {
-                let difference = relative_difference(found.into(), expected.into());
-                assert!(
-                    difference < 4.0 * TOLERANCE,
-                    "{estimator:?}, pixel {pixel}: {found} on the device, {expected} on the CPU"
-                );
-            }
-        }
-        assert!(behind_glass.iter().filter(|glass| glass.radius > 0.0).count() > 20);
-        let sums: Vec<[f32; 4]> = SEQUENCE_SUMS
-            .into_iter()
-            .flat_map(|sums| bench.download(sums))
-            .collect();
-        let sequences = cpu::resolve_sequences(&bench.settings, &sums, iterations);
-        for (index, (found, expected)) in resolved.sequences.iter().zip(&sequences).enumerate() {
-            for (found, expected) in found.iter().zip(expected) {
-                let difference = relative_difference((*found).into(), (*expected).into());
-                assert!(
-                    difference < TOLERANCE,
-                    "{estimator:?}, pixel {index} of the sequences: {found} on the device, {expected} on the CPU"
-                );
+        assert!(behind > 20, "{behind} pixels with light behind glass");
+        let sums = SEQUENCE_SUMS.map(|sums| bench.download::<[f32; 4]>(sums));
+        for (sequence, sums) in (0..).zip(&sums) {
+            let iterations = f64::from(iterations_of(sequence, iterations).max(1));
+            for (pixel_slot, slots) in (0..).zip(sums.chunks(slots_per_pixel)) {
+                let Some([x, y]) = pixel_of(resolution, pixel_slot) else {
+                    continue;
+                };
+                let pixel = (sequence * resolution[1] + y) as usize * width + x as usize;
+                for channel in 0..4 {
+                    let sum: f64 = slots.iter().map(|sum| f64::from(sum[channel])).sum();
+                    let (found, expected) = (resolved.sequences[pixel][channel].into(), sum / iterations);
+                    let difference = relative_difference(found, expected);
+                    assert!(
+                        difference < TOLERANCE,
+                        "{estimator:?}, sequence {sequence}, pixel {x}, {y}: {found} on the device, {expected} expected"
+                    );
+                }
             }
         }
     }
@@ -402,8 +512,8 @@ fn the_pictures_of_the_sequences_are_together_the_picture() {
         ("cornell-spheres", Estimator::Ppm),
     ] {
         let config = RenderConfig { estimator, ..small() };
-        let mut bench = Bench::new(name, config.clone());
-        let mut on_cpu = cpu::Renderer::new(&bench.scene, &scene(name).cameras[0], config).expect("a renderer");
+        let mut bench = Bench::new(name, config);
+        let mut on_cpu = bench.plain();
         let backends: [(&str, &mut dyn Backend); 2] = [("device", &mut bench.renderer), ("CPU", &mut on_cpu)];
         for (backend, renderer) in backends {
             while renderer.iterations() < ITERATIONS {

@@ -5,8 +5,7 @@ use std::f64::consts::PI;
 use glam::{DVec3, dvec3};
 use ppm_vk::backend::Backend;
 use ppm_vk::config::{Direct, EmissionChoice, RenderConfig, Sampler};
-use ppm_vk::cpu::{self, Batch, Counts, Inputs};
-use ppm_vk::emission::Aim;
+use ppm_vk::cpu;
 use ppm_vk::layout::{CAUSTIC, Photon};
 use ppm_vk::pipeline::Renderer;
 use ppm_vk::stage::BufferId;
@@ -20,6 +19,9 @@ use crate::stage::{faceted, subject};
 
 /// Photon paths: so many that each of the lanes has as many as any other.
 pub const PATHS: u32 = 65_536;
+
+/// Of them, what the CPU's independent samples have.
+const PATHS_A_LANE: u32 = 16;
 
 pub fn xyz([x, y, z, _]: [f32; 4]) -> DVec3 {
     dvec3(x.into(), y.into(), z.into())
@@ -61,20 +63,13 @@ pub fn on_both(subject: &Subject, config: &RenderConfig) -> [(&'static str, Vec<
         0,
         "the flux of paths that were ended is missing"
     );
-    let twin = cpu::Renderer::new(&subject.packed, &subject.scene.cameras[0], config.clone()).expect("renderer");
-    let inputs = Inputs {
-        demand: None,
-        scene: &subject.packed,
-        settings: twin.settings(),
-        config,
-        emission: twin.aim().map(Aim::table),
+    let plain = cpu::Renderer::new(&subject.packed, &subject.scene.cameras[0], config.clone()).expect("renderer");
+    let lane = |lane: u32| {
+        plain
+            .trace_photon_paths(0, PATHS_A_LANE * lane..PATHS_A_LANE * (lane + 1))
+            .0
     };
-    let batch = Batch {
-        iteration: 0,
-        first_path: 0,
-        paths: PATHS,
-    };
-    let on_cpu = cpu::photons(&inputs, batch, &Counts::default()).lanes;
+    let on_cpu = (0..PATHS / PATHS_A_LANE).map(lane).collect();
     [("device", photon_lanes(&mut renderer)), ("CPU", on_cpu)]
 }
 

@@ -1,9 +1,8 @@
 //! Grids that would have more cells than memory, radii of every size, photons that don't fit.
 
-use bytemuck::Zeroable;
 use glam::Vec3;
 use ppm_vk::config::{Direct, EmissionChoice, RenderConfig};
-use ppm_vk::cpu;
+use ppm_vk::cpu::{self, SeenByKernels};
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{Gathered, Photon, Statistics, VisiblePoint};
 use ppm_vk::scene::Scene;
@@ -22,8 +21,12 @@ fn assert_gathers_agree(
     radii2: &[f32],
     photons: &[Photon],
 ) -> Vec<u32> {
-    let mut expected = vec![Gathered::zeroed(); points.len()];
-    cpu::gather_naive(points, radii2, photons, &mut expected);
+    let seen = SeenByKernels {
+        points,
+        gloss: &[],
+        radii2,
+    };
+    let expected = cpu::gather_naive(&seen, photons);
     bench.upload(BufferId::VisiblePoints, points);
     bench.upload(BufferId::Radii2, radii2);
     bench.upload(BufferId::Photons, photons);
@@ -37,11 +40,11 @@ fn assert_gathers_agree(
         bench.renderer.gather(index, Probe::default()).expect("a gather");
         let found: Vec<Gathered> = bench.download(BufferId::GatheredOf);
         for (slot, (found, expected)) in found.iter().zip(&expected).enumerate() {
-            assert_eq!(count(found), count(expected), "{what}, {}, slot {slot}: M", method.name);
+            assert_eq!(count(found), expected.count, "{what}, {}, slot {slot}: M", method.name);
         }
         assert_sound(&mut bench.renderer);
     }
-    expected.iter().map(count).collect()
+    expected.iter().map(|gathered| gathered.count).collect()
 }
 
 fn with_radius(radius: f64) -> RenderConfig {

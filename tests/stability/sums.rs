@@ -2,7 +2,6 @@
 
 use bytemuck::Zeroable;
 use ppm_vk::config::{RenderConfig, Totals};
-use ppm_vk::cpu;
 use ppm_vk::film::Image;
 use ppm_vk::gather::METHODS;
 use ppm_vk::layout::{Coverage, DirectSum, Gathered, Photon, Statistics, VisiblePoint};
@@ -31,7 +30,10 @@ fn bench(alpha: f32) -> Bench {
     let mut bench = Bench::new("cornell", config);
     let points: Vec<VisiblePoint> = (0..SLOTS).map(|slot| visible_point([0.0; 3], slot)).collect();
     bench.upload(BufferId::VisiblePoints, &points);
-    bench.upload(BufferId::StatisticsOf, &[cpu::reset(RADIUS2); SLOTS as usize]);
+    bench.upload(
+        BufferId::StatisticsOf,
+        &[Statistics::of_radius2(RADIUS2); SLOTS as usize],
+    );
     bench.upload(BufferId::GatheredOf, &[Gathered::zeroed(); SLOTS as usize]);
     bench
 }
@@ -199,7 +201,7 @@ fn pictures_stay_right_when_more_than_two_to_the_32_photons_were_emitted() {
     for emitted in [(1u64 << 32) - 1, 1 << 32, (1 << 32) + 1, 1 << 33, 1 << 45] {
         let iterations = u32::MAX;
         let tau = std::f64::consts::PI * f64::from(RADIUS2) * emitted as f64;
-        let mut statistics = cpu::reset(RADIUS2);
+        let mut statistics = Statistics::of_radius2(RADIUS2);
         statistics.flux_high = [tau as f32; 4];
         let sum = DirectSum {
             high: [iterations as f32; 4],
@@ -243,7 +245,11 @@ fn a_visible_point_that_no_photon_ever_reaches_keeps_its_radius_and_stays_dark()
         }; SLOTS as usize],
     );
     let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
-    assert!(found.iter().all(|s| *s == cpu::reset(RADIUS2)), "{:?}", found[0]);
+    assert!(
+        found.iter().all(|s| *s == Statistics::of_radius2(RADIUS2)),
+        "{:?}",
+        found[0]
+    );
     let image = assert_sound(&mut bench.renderer);
     assert!(image.pixels().iter().all(|pixel| *pixel == [0.0; 3]));
 }

@@ -1,23 +1,25 @@
-//! Faces in one place: the counterpart of `glsl/shared/contact.glsl`.
+//! Where a ray meets matter: which of the faces in one place, with what textures make of it, and between which media.
 
 use glam::DVec3;
 
 use super::Inputs;
+use super::bsdf::Bsdf;
+use super::dispersion::ior_at;
 use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
+use super::lights::{emits, emitted_radiance};
 use super::media::{Media, Medium, bounded_medium, ior_of_medium};
-use super::surface::{Facing, Surface, surface_of};
+use super::surface::{Normals, Surface, surface_of};
 use super::texture::{apply_textures, is_face_there, share_there};
 use super::vector::rgb;
 use crate::layout::{
-    BACK_EMITS, BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, GLOSSY_SURFACE, Material, PARALLEL, ROUNDINGS,
-    SEE_THROUGH, TOUCHED,
+    BACK_EMITS, BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, Material, PARALLEL, ROUNDINGS, SEE_THROUGH, TOUCHED,
 };
 use crate::random::Random;
 
 /// What lies in the place where a ray meets matter.
-pub(super) struct Interface {
+struct Interface {
     /// That it meets, without its textures.
-    pub surface: Surface,
+    surface: Surface,
     /// Chance of that, where something isn't there everywhere.
     share: f64,
     /// A solid dielectric without thickness.
@@ -54,7 +56,7 @@ fn preference(surface: &Surface, incoming: DVec3) -> (bool, bool, bool, bool, u3
 
 impl Interface {
     /// `media`: those that the ray is in, as far as its path knows. With `culls` backs that no camera sees aren't there.
-    pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, culls: bool, random: &Random) -> Self {
+    fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, culls: bool, random: &Random) -> Self {
         let first = surface_of(inputs.scene, hit);
         let mut place = Self {
             surface: first,
@@ -169,9 +171,11 @@ fn others<'a>(
 }
 
 /// Where a ray meets matter.
-pub(super) struct Encounter {
+pub struct Interaction {
+    /// With its textures.
     pub surface: Surface,
-    pub facing: Facing,
+    /// On the side that the ray comes from.
+    pub normals: Normals,
     /// Chance that it is met there, where something isn't there everywhere.
     pub share: f64,
     /// A boundary inside of something of lower rank: nothing but its tint counts.
@@ -186,8 +190,8 @@ pub(super) struct Encounter {
     pub beyond: Media,
 }
 
-impl Encounter {
-    /// As [`Interface::new`].
+impl Interaction {
+    /// Of a ray that meets a face while it is in `media`. With `culls` backs that no camera sees aren't there.
     pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, culls: bool, random: &Random) -> Self {
         let Interface {
             mut surface,
@@ -201,11 +205,12 @@ impl Encounter {
         if is_flat {
             surface.material.thin = 1;
         }
-        let facing = Facing::new(&surface, incoming);
+        let of_front = [surface.geometric_normal, surface.shading_normal, surface.coat_normal];
+        let normals = Normals::of(of_front, -incoming);
         let nests = inputs.scene.features.nested && is_solid(&surface.material);
-        let outer = if facing.front { through } else { beyond };
+        let outer = if normals.front { through } else { beyond };
         Self {
-            facing,
+            normals,
             share,
             hidden: nests && through.first() == beyond.first(),
             outside: if nests {
@@ -219,40 +224,23 @@ impl Encounter {
             surface,
         }
     }
-}
 
-/// Whether a surface's material has a coat anywhere: photons on it have their flux across their rays.
-pub(super) fn has_coat(inputs: &Inputs<'_>, surface: &Surface) -> bool {
-    inputs.scene.materials[surface.material_index as usize].coat > 0.0
-}
-
-/// What part of a surface passes light; 1 for what is no dielectric at all.
-fn clear_part(material: &Material) -> f64 {
-    if material.surface == DIELECTRIC {
-        f64::from(material.transmission) * (1.0 - f64::from(material.metallic))
-    } else {
-        1.0
+    /// How it scatters, at a wavelength (nm) where that matters.
+    pub fn bsdf(&self, wavelength: Option<f64>) -> Bsdf {
+        let mut material = self.surface.material;
+        if let Some(wavelength) = wavelength.filter(|_| material.dispersion > 0.0) {
+            material.ior = ior_at(&material, wavelength) as f32;
+        }
+        Bsdf::new(&material, self.normals, self.outside, self.tint)
     }
-}
 
-/// Whether a surface passes a part of the light only.
-pub(super) fn is_mixed(material: &Material) -> bool {
-    clear_part(material) < 1.0
-}
-
-/// A surface that passes a part of the light only is by chance all clear or all glossy: makes it one of them, and returns
-/// whether it has a glossy part, and a uniform number.
-pub(super) fn choose_part(material: &mut Material, u: f64) -> (bool, f64) {
-    let t = clear_part(material);
-    if t >= 1.0 {
-        return (false, u);
-    }
-    // Of what isn't clear.
-    material.metallic = (f64::from(material.metallic) / (1.0 - t)).min(1.0) as f32;
-    if u < t {
-        (true, u / t)
-    } else {
-        material.surface = GLOSSY_SURFACE;
-        (true, (u - t) / (1.0 - t))
+    /// Radiance that leaves towards where the ray comes from.
+    pub fn emitted(&self, incoming: DVec3) -> DVec3 {
+        let material = &self.surface.material;
+        if emits(material, self.normals.front) {
+            emitted_radiance(material, -incoming.dot(self.normals.geometric))
+        } else {
+            DVec3::ZERO
+        }
     }
 }

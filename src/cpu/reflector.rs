@@ -1,14 +1,16 @@
-//! Glossy reflection as glTF 2.0, appendix B, has it: `glsl/shared/gloss.glsl` in f64, which cites the sources.
+//! Glossy reflection as glTF 2.0, appendix B, has it: a Lambertian base under a boundary of GGX microfacets.
+//! `glsl/shared/gloss.glsl` cites the sources.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 use half::f16;
 
-use super::sampling::{basis, decode_direction, encode_direction};
-use super::vector::{rgb, with_word, word, xyz};
+use super::sampling::{basis, decode_direction};
+use super::vector::{rgb, word, xyz};
 use crate::layout::{COAT_F0, COATED, Gloss, Material, SMOOTH_ALPHA};
 
+/// The fifth power of 1 − cosine.
 pub(super) fn schlick(cosine: f64) -> f64 {
     (1.0 - cosine).clamp(0.0, 1.0).powi(5)
 }
@@ -36,8 +38,30 @@ pub fn coat_passes(coat: f64, cosine: f64) -> f64 {
 }
 
 impl Reflector {
+    /// A Lambertian one.
+    pub fn matte(albedo: DVec3) -> Self {
+        Self {
+            diffuse: albedo,
+            f0: DVec3::ZERO,
+            f90: 0.0,
+            over_base: [0.0; 2],
+            alpha: 0.0,
+            coat: 0.0,
+        }
+    }
+
+    /// A perfect mirror: Schlick's approximation, as glTF 2.0, appendix B, has it for metals.
+    pub fn mirror(f0: DVec3, coat: f64) -> Self {
+        Self {
+            f0,
+            f90: 1.0,
+            coat,
+            ..Self::matte(DVec3::ZERO)
+        }
+    }
+
     /// A glossy material's.
-    pub(super) fn of_material(material: &Material) -> Self {
+    pub fn glossy(material: &Material) -> Self {
         let (base, metallic) = (rgb(material.base_color), f64::from(material.metallic));
         Self {
             diffuse: base * (1.0 - metallic),
@@ -52,33 +76,27 @@ impl Reflector {
         }
     }
 
-    /// A Lambertian one.
-    pub(super) fn matte(albedo: DVec3) -> Self {
+    /// A clear coat by itself.
+    pub fn coat(material: &Material) -> Self {
+        let coat = f64::from(material.coat);
         Self {
-            diffuse: albedo,
-            f0: DVec3::ZERO,
-            f90: 0.0,
-            over_base: [0.0; 2],
-            alpha: 0.0,
-            coat: 0.0,
-        }
-    }
-
-    /// The microfacets of glass; what it reflects isn't among this.
-    pub(super) fn microfacets_of(glass: &Material) -> Self {
-        Self {
-            alpha: f64::from(glass.roughness).powi(2),
+            f0: DVec3::splat(COAT_F0 * coat),
+            f90: coat,
+            alpha: f64::from(material.coat_roughness).powi(2),
             ..Self::matte(DVec3::ZERO)
         }
     }
 
-    /// Whether the material of a visible point is coated: α's sign.
-    pub(super) fn is_coated(gloss: &Gloss) -> bool {
-        gloss.rest[2] & COATED != 0
+    /// The microfacets of glass; what they reflect isn't among this.
+    pub(super) fn microfacets(alpha: f64) -> Self {
+        Self {
+            alpha,
+            ..Self::matte(DVec3::ZERO)
+        }
     }
 
-    /// What a visible point keeps, and the direction to the viewer.
-    pub(super) fn from_gloss(gloss: &Gloss) -> (Self, DVec3) {
+    /// What a visible point of the kernels keeps, the direction to the viewer, and whether the material is coated.
+    pub(super) fn of_gloss(gloss: &Gloss) -> (Self, DVec3, bool) {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
         let [f0_rg, f0_b_f90, alpha_coat, over_base] = gloss.rest.map(|word| [half(word), half(word >> 16)]);
         let reflector = Self {
@@ -89,25 +107,15 @@ impl Reflector {
             alpha: alpha_coat[0].abs(),
             coat: alpha_coat[1],
         };
-        (reflector, decode_direction(word(gloss.diffuse_viewer)))
+        let viewer = decode_direction(word(gloss.diffuse_viewer));
+        (reflector, viewer, gloss.rest[2] & COATED != 0)
     }
 
-    pub(super) fn to_gloss(self, v: DVec3, coated: bool) -> Gloss {
-        let halves = |[low, high]: [f64; 2]| {
-            let half = |value: f64| u32::from(f16::from_f64(value).to_bits());
-            half(low) | half(high) << 16
-        };
-        let rest = [
-            [self.f0.x, self.f0.y],
-            [self.f0.z, self.f90],
-            [self.alpha, self.coat],
-            self.over_base,
-        ];
-        let mut rest = rest.map(halves);
-        rest[2] |= if coated { COATED } else { 0 };
-        Gloss {
-            diffuse_viewer: with_word(self.diffuse, encode_direction(v)),
-            rest,
+    /// The same without its base.
+    pub fn boundary(self) -> Self {
+        Self {
+            diffuse: DVec3::ZERO,
+            ..self
         }
     }
 
@@ -122,7 +130,8 @@ impl Reflector {
         1.0 - (normal + (grazing - normal) * schlick(cosine))
     }
 
-    pub(super) fn is_smooth(&self) -> bool {
+    /// Whether the boundary is a mirror.
+    pub fn is_smooth(&self) -> bool {
         self.alpha < SMOOTH_ALPHA
     }
 
@@ -143,14 +152,14 @@ impl Reflector {
             return DVec3::ZERO;
         }
         let h = (v + l).normalize();
-        let f = self.fresnel(v.dot(h));
-        let passes = coat_passes(self.coat, v.dot(h));
         let base = self.through_to_base(v.dot(h)) * self.diffuse / PI;
-        if self.is_smooth() {
-            return passes * base;
-        }
-        let visibility = 0.5 / (nl * self.masking_root(nv) + nv * self.masking_root(nl));
-        passes * (base + f * self.ggx(n, h) * visibility)
+        let lobe = if self.is_smooth() {
+            DVec3::ZERO
+        } else {
+            let visibility = 0.5 / (nl * self.masking_root(nv) + nv * self.masking_root(nl));
+            self.fresnel(v.dot(h)) * self.ggx(n, h) * visibility
+        };
+        coat_passes(self.coat, v.dot(h)) * (base + lobe)
     }
 
     /// Share of the samples that go to the boundary's reflection.
@@ -166,7 +175,7 @@ impl Reflector {
         }
     }
 
-    /// A microfacet's normal that v sees.
+    /// A microfacet's normal that v sees: Dupuy and Benyoub, «Sampling Visible GGX Normals with Spherical Caps», 2023.
     pub(super) fn visible_normal(&self, n: DVec3, v: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
         let frame = basis(n);
         let local = frame.transpose() * v;
