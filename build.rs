@@ -1,5 +1,5 @@
-//! Compiles `glsl/stages/*.comp`, and `glsl/probes/*.comp` for tests, to SPIR-V, reflects what each stage binds, and writes the `shaders` module. What host and
-//! kernels share, `layout.glsl` and `settings.glsl`, is generated.
+//! Compiles the kernels in `glsl/stages`, `glsl/ladder` and, for tests, `glsl/probes` to SPIR-V, reflects what each stage binds,
+//! and writes the `shaders` module. What host and kernels share, `layout.glsl` and `settings.glsl`, is generated.
 //!
 //! A block's name in GLSL is its buffer's name in [`BufferId`](src/stage.rs): a name without a variant of that enum
 //! fails the compilation of the generated module. Bindings are numbered by the compiler and never written by hand.
@@ -27,7 +27,7 @@ fn main() -> Result<()> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
 
     let mut sources = Vec::new();
-    for folder in ["glsl/stages", "glsl/probes"] {
+    for folder in ["glsl/stages", "glsl/ladder", "glsl/probes"] {
         for entry in fs::read_dir(root.join(folder))? {
             sources.push(entry?.path());
         }

@@ -237,9 +237,13 @@ fn functions_that_kernels_call_in_loops_return_once() {
 
 #[test]
 fn every_stage_is_documented_where_it_is_written() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl/stages");
-    for entry in fs::read_dir(folder).expect("folder") {
-        let path = entry.expect("entry").path();
+    let folders = ["glsl/stages", "glsl/ladder", "glsl/probes"];
+    let files = folders.iter().flat_map(|folder| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+        fs::read_dir(folder).expect("folder")
+    });
+    let paths = files.map(|entry| entry.expect("entry").path());
+    for path in paths.filter(|path| path.extension().is_some_and(|extension| extension == "comp")) {
         let text = fs::read_to_string(&path).expect("stage");
         let comment = text.lines().find(|line| !line.starts_with('#')).unwrap_or("");
         assert!(

@@ -1,15 +1,17 @@
 //! The table of gather methods. Command line, tests, bench and reports iterate over [`METHODS`].
 
-mod photons;
-mod points;
+mod clustered;
+mod ladder;
 mod primitives;
 
-pub use photons::grid_sizes;
+pub use clustered::grid_sizes;
 pub use primitives::{PHOTON_PAIRS, POINT_PAIRS, Pairs, scan, sort};
 
+use self::ladder::{photons, points};
 use crate::layout::GROUP;
 use crate::record::Recording;
 use crate::sizes::Sizes;
+use crate::stage::{Shader, StageDesc};
 
 /// Records stages for buffers of these sizes.
 pub type Record = fn(&Sizes, &mut Recording);
@@ -152,7 +154,7 @@ pub const METHODS: &[GatherMethod] = &[
         name: "clustered",
         summary: "runs of neighbouring visible points share what they load from rows of a hashed grid",
         paper: "beyond the paper",
-        runs: device(points::by_slot, photons::hashed_grid, Tests::Near, |sizes| {
+        runs: device(points::by_slot, clustered::hashed_grid, Tests::Near, |sizes| {
             sizes.clustered_run
         }),
     },
@@ -190,4 +192,18 @@ pub fn default_cpu_method() -> usize {
 /// Whether this stage gathers, rather than preparing it.
 pub fn is_gather_stage(stage: &str) -> bool {
     stage.starts_with("gather_")
+}
+
+fn gather_stage(shader: &'static Shader, threads: u32, sizes: &Sizes) -> StageDesc {
+    StageDesc::new(shader, threads).constants(vec![
+        ("COUNT_TESTS", u32::from(sizes.probe.count_tests)),
+        ("GLOSSY", u32::from(sizes.glossy)),
+    ])
+}
+
+/// First and end of the photons of each of a gather's launches: one launch unless the driver cuts its loops.
+fn parts(sizes: &Sizes) -> impl Iterator<Item = [u32; 2]> {
+    let part = sizes.photon_capacity.div_ceil(sizes.gather_parts).max(1);
+    let firsts = (0..sizes.photon_capacity).step_by(part as usize);
+    firsts.map(move |first| [first, first.saturating_add(part)])
 }

@@ -5,7 +5,7 @@
 layout(local_size_x = 64) in;
 
 #include "common/invocation.glsl"
-#include "gather/clusters.glsl"
+#include "ladder/clusters.glsl"
 
 layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };
 layout(std430) readonly buffer ClusterOf { uint cluster_of[]; };

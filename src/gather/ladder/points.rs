@@ -1,6 +1,6 @@
 //! Orders of visible points: what is recorded when they are new.
 
-use super::primitives::{POINT_PAIRS, scan, sort};
+use crate::gather::primitives::{POINT_PAIRS, scan, sort};
 use crate::layout::{CURVE_BITS, GROUP, NO_SLOT};
 use crate::record::Recording;
 use crate::shaders;

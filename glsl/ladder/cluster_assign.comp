@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 #include "settings.glsl"
 #include "common/texel.glsl"
 #include "gather/visible_point.glsl"
-#include "gather/clusters.glsl"
+#include "ladder/clusters.glsl"
 
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer Centroids;

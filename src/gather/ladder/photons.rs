@@ -1,11 +1,12 @@
 //! Orders of photons, and gathering from them: what is recorded for each batch of photons.
 
-use super::primitives::{PHOTON_PAIRS, scan, sort};
+use crate::gather::primitives::scan;
+use crate::gather::{gather_stage, parts};
 use crate::layout::GROUP;
 use crate::record::Recording;
 use crate::shaders;
 use crate::sizes::{EXHAUSTIVE_RANGE, Sizes};
-use crate::stage::{BufferId, Shader, StageDesc};
+use crate::stage::{BufferId, StageDesc};
 
 /// How a gather that tests every photon goes about it.
 #[derive(Default, Clone, Copy)]
@@ -132,13 +133,6 @@ fn dealing(groups: u32) -> u32 {
         .unwrap_or(1)
 }
 
-fn gather_stage(shader: &'static Shader, threads: u32, sizes: &Sizes) -> StageDesc {
-    StageDesc::new(shader, threads).constants(vec![
-        ("COUNT_TESTS", u32::from(sizes.probe.count_tests)),
-        ("GLOSSY", u32::from(sizes.glossy)),
-    ])
-}
-
 /// The paper's photon sorting: one map a mesh, filled by an atomic counter a mesh.
 fn sort_by_mesh(sizes: &Sizes, recording: &mut Recording) {
     let photons = sizes.photon_capacity;
@@ -166,37 +160,4 @@ pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
             recording.dispatch(stage.push([first, end, groups, dealing(groups), map]));
         }
     }
-}
-
-/// Cell sizes of the hashed grids, from the radii.
-pub fn grid_sizes(sizes: &Sizes, recording: &mut Recording) {
-    recording.fill(BufferId::RadiiOfShells, 0);
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, sizes.receivers()).push(sizes.radius_step()));
-    recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup));
-}
-
-/// The cells of hashed grids that a few neighbouring visible points reach.
-pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
-    let photons = sizes.photon_capacity;
-    recording.fill(BufferId::CellStarts, 0);
-    recording.dispatch(StageDesc::new(&shaders::GRID_KEYS, photons));
-    scan(BufferId::CellStarts, (1 << sizes.cell_bits) + 1, recording);
-    let [sorted, _] = sort(BufferId::PhotonCount, photons, sizes.cell_bits, PHOTON_PAIRS, recording);
-    let values = vec![(BufferId::ValuesIn, sorted.values)];
-    recording.dispatch(StageDesc::new(&shaders::GRID_PHOTONS, photons).bind(values));
-    let runs = sizes.receivers().div_ceil(sizes.clustered_run);
-    for [first, end] in parts(sizes) {
-        recording.dispatch(
-            gather_stage(&shaders::GATHER_CLUSTERED, runs, sizes)
-                .constant("RUN", sizes.clustered_run)
-                .push([first, end]),
-        );
-    }
-}
-
-/// First and end of the photons of each of a gather's launches: one launch unless the driver cuts its loops.
-fn parts(sizes: &Sizes) -> impl Iterator<Item = [u32; 2]> {
-    let part = sizes.photon_capacity.div_ceil(sizes.gather_parts).max(1);
-    let firsts = (0..sizes.photon_capacity).step_by(part as usize);
-    firsts.map(move |first| [first, first.saturating_add(part)])
 }

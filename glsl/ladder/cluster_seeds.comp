@@ -7,7 +7,7 @@ layout(local_size_x = 64) in;
 #include "common/invocation.glsl"
 #include "settings.glsl"
 #include "gather/visible_point.glsl"
-#include "gather/clusters.glsl"
+#include "ladder/clusters.glsl"
 
 uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };

@@ -13,7 +13,7 @@ layout(local_size_x = 64) in;
 #include "gather/visible_point.glsl"
 #include "gather/statistics.glsl"
 #include "gather/gather.glsl"
-#include "gather/point_groups.glsl"
+#include "ladder/point_groups.glsl"
 #include "trace/object_grid.glsl"
 #include "common/status.glsl"
 

@@ -13,8 +13,8 @@ layout(local_size_x = 64) in;
 #include "gather/visible_point.glsl"
 #include "gather/statistics.glsl"
 #include "gather/gather.glsl"
-#include "gather/point_groups.glsl"
-#include "gather/exhaustive.glsl"
+#include "ladder/point_groups.glsl"
+#include "ladder/exhaustive.glsl"
 
 uniform usamplerBuffer GatheredFrom;
 
