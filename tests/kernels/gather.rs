@@ -1,5 +1,6 @@
 //! The gather methods: every one finds the same photons, N and M exactly, as testing each photon on the CPU.
 
+use glam::DVec3;
 use ppm_vk::backend::Backend;
 use ppm_vk::config::RenderConfig;
 use ppm_vk::cpu;
@@ -63,11 +64,17 @@ fn assert_methods_agree_on(
     );
     let radii2 = radii2(statistics);
     let expected = cpu::gather_naive(&seen.with(&radii2), photons);
+    let alpha = f64::from(bench.config.alpha);
     let update = |(index, (gathered, before)): (usize, (&cpu::Gathered, &Statistics))| {
-        let mut statistics = cpu::Statistics::from(before);
-        let flux = xyz(points[index % points.len()].weight_normal) * gathered.flux;
-        statistics.take(gathered.count, flux, bench.config.alpha.into());
-        statistics
+        let weight = xyz(points[index % points.len()].weight_normal);
+        let mut updated = cpu::Statistics::from(before);
+        updated.take(gathered.count, weight * gathered.flux, alpha);
+        // The curvature goes the flux's way.
+        let mut curvature = cpu::Statistics::from(before);
+        curvature.flux = DVec3::splat((before.flux_high[3] + before.flux_low[3]).into());
+        let of_disc = weight.element_sum() / 3.0 * gathered.curvature(before.radius2_high.into());
+        curvature.take(gathered.count, DVec3::splat(of_disc), alpha);
+        (updated, curvature.flux.x)
     };
     let updated: Vec<_> = expected.iter().zip(statistics).enumerate().map(update).collect();
 
@@ -123,9 +130,17 @@ fn assert_same_photons(what: &str, found: &[Gathered], expected: &[cpu::Gathered
     }
 }
 
-fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[cpu::Statistics]) {
-    for (slot, (found, expected)) in found.iter().zip(expected).enumerate() {
+fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[(cpu::Statistics, f64)]) {
+    for (slot, (found, (expected, curvature))) in found.iter().zip(expected).enumerate() {
+        let found_curvature = f64::from(found.flux_high[3]) + f64::from(found.flux_low[3]);
         let found = cpu::Statistics::from(found);
+        // A difference of sums that are as large as the flux.
+        let off =
+            (found_curvature - curvature).abs() / (expected.flux.element_sum() / 3.0 + curvature.abs()).max(1e-30);
+        assert!(
+            off <= 1e-4,
+            "{what}, slot {slot}: curvature {found_curvature} on the device, {curvature} on the CPU"
+        );
         assert_eq!(
             found.accepted, expected.accepted,
             "{what}, slot {slot}: photons accepted"

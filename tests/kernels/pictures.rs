@@ -62,6 +62,7 @@ fn mean_of(samples: &[f64]) -> (f64, f64) {
 #[test]
 fn both_renderers_converge_to_the_same_picture() {
     const STUDENT: f64 = 7.5;
+    let mut wrong = Vec::new();
     for (name, estimator, direct, max_depth) in [
         ("cornell-spheres", Estimator::Sppm, Direct::Light, 128),
         ("cornell-spheres", Estimator::Ppm, Direct::Photons, 128),
@@ -81,9 +82,9 @@ fn both_renderers_converge_to_the_same_picture() {
         ("glasses, softly lit", Estimator::Sppm, Direct::Light, 128),
         // One bounce: direct light alone, without the photons' noise.
         ("many-lamps", Estimator::Sppm, Direct::Light, 1),
-        ("glossy, lit", Estimator::Sppm, Direct::Light, 1),
-        ("glossy, patterned", Estimator::Sppm, Direct::Light, 1),
-        ("plaza, lit", Estimator::Sppm, Direct::Light, 1),
+        ("cornell, lit", Estimator::Sppm, Direct::Light, 1),
+        ("cornell, patterned", Estimator::Sppm, Direct::Light, 1),
+        ("cornell, softly lit", Estimator::Sppm, Direct::Light, 1),
     ] {
         let what = format!("{name}, {estimator:?}, direct light from {direct:?}, {max_depth} bounces");
         let (mut found, mut expected) = (Vec::new(), Vec::new());
@@ -133,6 +134,9 @@ fn both_renderers_converge_to_the_same_picture() {
             }
         }
         println!("{what}: {worst:.1} standard errors at the most, {worst_text}");
-        assert!(worst < STUDENT, "{what}: {worst} standard errors, {worst_text}");
+        if worst >= STUDENT {
+            wrong.push(format!("{what}: {worst} standard errors, {worst_text}"));
+        }
     }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }

@@ -183,9 +183,14 @@ fn discs_follow_footprints_and_are_counted_in_their_shells() {
     let mut bench = Bench::new("cornell-spheres", small());
     let seen = bench.seen();
     let receivers = bench.renderer.sizes().receivers();
-    // Some slots see something for the first time, some have discs that are too large here.
+    // Some slots see something for the first time; of the others a few have discs that are too large here, and bound the cells.
     let statistics: Vec<Statistics> = random_numbers(receivers)
-        .map(|[u, v, ..]| Statistics::of_radius2(if u < 0.3 { 0.0 } else { 0.1 * v * v }))
+        .map(|[u, v, ..]| match u {
+            ..0.1 => 0.0,
+            0.98.. => 0.1 * v,
+            _ => 1e-8 * v,
+        })
+        .map(Statistics::of_radius2)
         .collect();
     bench.upload(BufferId::StatisticsOf, &statistics);
     let step = bench.renderer.sizes().radius_step();

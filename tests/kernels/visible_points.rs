@@ -64,7 +64,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
         places.note(same, || {
             format!("slot {slot}: {found:?} instead of {expected:?}, {distance:e} apart")
         });
-        // Where nothing was left to chance: both gather all that the surface scatters.
+        // Where nothing was left to chance both gather all that the surface scatters. (Through a thin wall paths go straight too.)
         if !same || expected.throughput != glam::DVec3::ONE || material.coat > 0.0 {
             continue;
         }
@@ -104,8 +104,6 @@ fn paths_that_go_straight_end_where_the_cpus_end_and_gather_what_those_gather() 
         ("textures", 1000, 500),
         ("instances", 2000, 1000),
         ("coats", 1000, 0),
-        ("glasses", 1000, 1000),
-        ("plaza", 500, 500),
     ] {
         assert_camera_agrees(name, small(), least_seen, least_compared);
     }
