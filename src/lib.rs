@@ -15,7 +15,9 @@
 
 pub mod alias;
 pub mod backend;
+#[path = "../program/bench/mod.rs"]
 pub mod bench;
+#[path = "../program/cli/mod.rs"]
 pub mod cli;
 pub mod config;
 pub mod cpu;
