@@ -12,15 +12,15 @@ use std::path::Path;
 
 use anyhow::{Context, Error, Result};
 use glam::{DVec2, DVec3, Vec2Swizzles as _, Vec3};
-use ppm_vk::backend::Backend;
-use ppm_vk::config::RenderConfig;
-use ppm_vk::emission::Table;
-use ppm_vk::film::write_rgb8;
-use ppm_vk::gpu::Device;
-use ppm_vk::layout::{DIRECTIONAL_LIGHT, EmissionCell, Light};
-use ppm_vk::packing::PackedScene;
-use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::emission::Table;
+use ppm_vk::internals::film::write_rgb8;
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::layout::{DIRECTIONAL_LIGHT, EmissionCell, Light};
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::scene::Scene;
 
 /// Pixels of a panel's side.
 const SIDE: usize = 256;

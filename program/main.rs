@@ -1,9 +1,12 @@
 //! The `ppm-vk` program. Exit codes: 0 done, 1 the work failed, 2 the arguments are wrong, 130 interrupted.
 
+mod bench;
+mod cli;
+
 use std::io::Write as _;
 use std::process::ExitCode;
 
-use ppm_vk::cli::{self, Outcome};
+use cli::Outcome;
 
 fn main() -> ExitCode {
     match cli::run() {
@@ -11,7 +14,7 @@ fn main() -> ExitCode {
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(error) => {
             // A stderr that can't be written to must not change the exit code.
-            let line = ppm_vk::text::escaped(&format!("error: {error:#}"));
+            let line = ppm_vk::internals::text::escaped(&format!("error: {}", cli::words::line(&error)));
             let _ = writeln!(std::io::stderr(), "{line}");
             ExitCode::FAILURE
         }

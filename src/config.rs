@@ -1,61 +1,69 @@
 //! What the user asked for.
 
+mod choice;
 pub mod ranges;
 mod tiles;
 
+pub use choice::Choice;
+pub(crate) use choice::choices;
 pub use tiles::pixel_of;
 
 use std::fmt::Display;
 
 use ranges::Checked;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 pub use crate::layout::SEQUENCES;
 use crate::layout::{ASKS_EVERY, CONGRUENTIAL, COVERAGE_WHOLE, INDEPENDENT, SOBOL};
 
-/// Which visible points an iteration uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Estimator {
-    /// Stochastic progressive photon mapping: new visible points each iteration, statistics shared by the pixel.
-    Sppm,
-    /// Progressive photon mapping as in the paper: visible points found once.
-    Ppm,
+choices! {
+    /// Which visible points an iteration uses.
+    pub enum Estimator {
+        /// Stochastic progressive photon mapping: new visible points each iteration, statistics shared by the pixel.
+        Sppm => "sppm",
+        /// Progressive photon mapping as in the paper: visible points found once.
+        Ppm => "ppm",
+    }
 }
 
-/// Where direct light comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Direct {
-    /// A shadow ray to a point of a light.
-    Light,
-    /// Photons, as in the paper.
-    Photons,
+choices! {
+    /// Where direct light comes from.
+    pub enum Direct {
+        /// A shadow ray to a point of a light.
+        Light => "light",
+        /// Photons, as in the paper.
+        Photons => "photons",
+    }
 }
 
-/// How rays meet triangles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Accel {
-    /// A bounding volume hierarchy.
-    Bvh,
-    /// Every triangle, as in the paper.
-    Brute,
+choices! {
+    /// How rays meet triangles.
+    pub enum Accel {
+        /// A bounding volume hierarchy.
+        Bvh => "bvh",
+        /// Every triangle, as in the paper.
+        Brute => "brute",
+    }
 }
 
-/// How a ray is tested against a triangle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum TriangleTest {
-    /// From the triangle's corners: no ray passes between triangles that share an edge or a corner (Woop and others).
-    Watertight,
-    /// From precomputed planes, as in the paper (Havel and Herout): some rays pass between neighbours.
-    Havel,
+choices! {
+    /// How a ray is tested against a triangle.
+    pub enum TriangleTest {
+        /// From the triangle's corners: no ray passes between triangles that share an edge or a corner (Woop and others).
+        Watertight => "watertight",
+        /// From precomputed planes, as in the paper (Havel and Herout): some rays pass between neighbours.
+        Havel => "havel",
+    }
 }
 
-/// How photon paths start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum EmissionChoice {
-    /// Where paths were found to bring photons that the picture needs.
-    Aimed,
-    /// In proportion to the lights' power, as in the paper.
-    Power,
+choices! {
+    /// How photon paths start.
+    pub enum EmissionChoice {
+        /// Where paths were found to bring photons that the picture needs.
+        Aimed => "aimed",
+        /// In proportion to the lights' power, as in the paper.
+        Power => "power",
+    }
 }
 
 impl EmissionChoice {
@@ -68,16 +76,17 @@ impl EmissionChoice {
     }
 }
 
-/// Where the numbers of paths come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-#[repr(u32)]
-pub enum Sampler {
-    /// Scrambled Sobol' sequences: samples that spread evenly, over an iteration's photons and over a pixel's iterations.
-    Sobol = SOBOL,
-    /// Independent numbers, from a hash.
-    Independent = INDEPENDENT,
-    /// A congruential generator for each path, as in the paper. Neighbouring paths are correlated: for comparison alone.
-    Congruential = CONGRUENTIAL,
+choices! {
+    /// Where the numbers of paths come from.
+    #[repr(u32)]
+    pub enum Sampler {
+        /// Scrambled Sobol' sequences: samples that spread evenly, over an iteration's photons and over a pixel's iterations.
+        Sobol = SOBOL => "sobol",
+        /// Independent numbers, from a hash.
+        Independent = INDEPENDENT => "independent",
+        /// A congruential generator for each path, as in the paper; neighbouring paths are correlated: for comparison alone.
+        Congruential = CONGRUENTIAL => "congruential",
+    }
 }
 
 impl Sampler {
@@ -145,10 +154,10 @@ pub fn iterations_of(sequence: u32, iterations: u32) -> u32 {
 /// Paths of a pixel in an iteration at the most: so many cost little beside as many photon paths.
 const MOST_CAMERA_PATHS: u32 = 8;
 
-fn in_range<T>(flag: &str, value: impl Display, checked: Checked<T>) -> Result<()> {
+fn in_range<T>(setting: Setting, value: impl Display, checked: Checked<T>) -> Result<()> {
     match checked {
         Ok(_) => Ok(()),
-        Err(wrong) => Err(Error::Config(format!("--{flag} {value}: {wrong}"))),
+        Err(wrong) => Err(Error::setting(setting, format!("{value}: {wrong}"))),
     }
 }
 
@@ -180,18 +189,18 @@ impl RenderConfig {
     pub fn check(&self) -> Result<()> {
         let [width, height] = self.resolution;
         in_range(
-            "resolution",
+            Setting::Resolution,
             format!("{width}x{height}"),
             ranges::resolution(self.resolution),
         )?;
-        in_range("alpha", self.alpha, ranges::alpha(self.alpha))?;
-        in_range("photons", self.photons, ranges::count(self.photons))?;
-        in_range("max-depth", self.max_depth, ranges::count(self.max_depth))?;
+        in_range(Setting::Alpha, self.alpha, ranges::alpha(self.alpha))?;
+        in_range(Setting::Photons, self.photons, ranges::count(self.photons))?;
+        in_range(Setting::MaxDepth, self.max_depth, ranges::count(self.max_depth))?;
         if let Some(radius) = self.radius {
-            in_range("radius", radius, ranges::positive(radius))?;
+            in_range(Setting::Radius, radius, ranges::positive(radius))?;
         }
         if let Some(count) = self.cell_photons {
-            in_range("cell-photons", count, ranges::count(count))?;
+            in_range(Setting::CellPhotons, count, ranges::count(count))?;
         }
         Ok(())
     }

@@ -1,5 +1,7 @@
-//! The library's errors. Each message says in one line what is wrong, where, and what to do about it.
+//! The library's errors. Each message says in one line what is wrong, where, and what to do about it. None names a program's
+//! flags: [`Setting`] and [`Remedy`] tell a program which of its own to name.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Result of a library function.
@@ -7,6 +9,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 /// Everything that can go wrong outside the program's own logic.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A scene file that can't be read, is damaged, or lacks something that rendering needs.
     #[error("{}: {what}", path.display())]
@@ -16,7 +19,25 @@ pub enum Error {
         /// What is wrong, where in the file, and what to do.
         what: String,
     },
-    /// A setting outside its range.
+    /// A scene or an environment that needs more memory than [`LoadOptions::memory_limit`](crate::LoadOptions::memory_limit).
+    #[error("{}: {what}; make it smaller, or allow more", path.display())]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// What needs how much.
+        what: String,
+        /// Bytes that would have been enough when it was refused.
+        needed: u64,
+    },
+    /// A setting outside its range, or one that doesn't suit the scene or the device.
+    #[error("{setting} {what}")]
+    Setting {
+        /// Which one.
+        setting: Setting,
+        /// Its value, and what is wrong with it.
+        what: String,
+    },
+    /// Something that was asked for and can't be.
     #[error("{0}")]
     Config(String),
     /// A file that can't be read or written.
@@ -27,9 +48,17 @@ pub enum Error {
         /// What failed, and what to do.
         what: String,
     },
-    /// No usable Vulkan loader or device, or one that lacks what the program needs.
+    /// A device that failed.
     #[error("{0}")]
     Device(String),
+    /// No usable Vulkan loader or device, or a device that can't do what is asked of it.
+    #[error("{what}; {remedy}")]
+    Unfit {
+        /// What is wrong.
+        what: String,
+        /// What helps.
+        remedy: Remedy,
+    },
     /// A Vulkan call that failed.
     #[error("Vulkan: {call} failed: {code}")]
     Vulkan {
@@ -40,7 +69,112 @@ pub enum Error {
     },
 }
 
+/// A setting, named as its field in [`RenderConfig`](crate::RenderConfig) or as what it sets of a lens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Setting {
+    /// Pixels.
+    Resolution,
+    /// Photon paths of an iteration.
+    Photons,
+    /// Eq. 2's α.
+    Alpha,
+    /// The initial radius.
+    Radius,
+    /// Bounces of a path.
+    MaxDepth,
+    /// Photons of a grid cell.
+    CellPhotons,
+    /// How photons are gathered.
+    Gather,
+    /// How rays meet triangles.
+    Accel,
+    /// A lens's radius.
+    Aperture,
+    /// The distance of what a lens has in focus.
+    Focus,
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
+        text.write_str(match self {
+            Self::Resolution => "resolution",
+            Self::Photons => "photons",
+            Self::Alpha => "alpha",
+            Self::Radius => "radius",
+            Self::MaxDepth => "max_depth",
+            Self::CellPhotons => "cell_photons",
+            Self::Gather => "gather",
+            Self::Accel => "accel",
+            Self::Aperture => "aperture",
+            Self::Focus => "focus",
+        })
+    }
+}
+
+/// What helps where a device can't do what is asked of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Remedy {
+    /// A Vulkan loader, or the CPU.
+    InstallLoader,
+    /// A Vulkan driver, or the CPU.
+    InstallDriver,
+    /// Another device, or the CPU.
+    AnotherDevice,
+    /// Another Vulkan device: the CPU has nothing to say here.
+    AnotherVulkanDevice,
+    /// A device that is named by more of its name, or by its index.
+    NameOneDevice,
+    /// Fewer photons or a smaller picture.
+    SmallerRender,
+    /// A picture of so many pixels, another device, or the CPU.
+    Resolution([u32; 2]),
+    /// A scene with smaller textures, another device, or the CPU.
+    SmallerTextures,
+    /// A smaller picture of the environment, another device, or the CPU.
+    SmallerEnvironment,
+    /// A smaller scene, another device, or the CPU.
+    SmallerScene,
+}
+
+impl fmt::Display for Remedy {
+    fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = match self {
+            Self::InstallLoader => "install one (Debian: libvulkan1 mesa-vulkan-drivers)",
+            Self::InstallDriver => "install a Vulkan driver (Debian: mesa-vulkan-drivers)",
+            Self::NameOneDevice => return text.write_str("give more of the name, or the index"),
+            Self::AnotherVulkanDevice => return text.write_str("use another device"),
+            Self::SmallerRender => return text.write_str("try fewer photons or a smaller picture"),
+            Self::AnotherDevice => "use another device",
+            Self::Resolution([width, height]) => {
+                return write!(text, "try {width}x{height} pixels, another device or the CPU");
+            }
+            Self::SmallerTextures => "make the scene's textures smaller, use another device",
+            Self::SmallerEnvironment => "make the environment's picture smaller, use another device",
+            Self::SmallerScene => "make the scene smaller, use another device",
+        };
+        write!(text, "{what} or the CPU")
+    }
+}
+
 impl Error {
+    /// A device that can't do what is asked of it.
+    pub(crate) fn unfit(what: impl Into<String>, remedy: Remedy) -> Self {
+        Self::Unfit {
+            what: one_line(what.into()),
+            remedy,
+        }
+    }
+
+    /// A setting that is wrong.
+    pub(crate) fn setting(setting: Setting, what: impl Into<String>) -> Self {
+        Self::Setting {
+            setting,
+            what: what.into(),
+        }
+    }
+
     /// An error about the scene file at `path`.
     pub fn scene(path: &Path, what: impl Into<String>) -> Self {
         Self::Scene {

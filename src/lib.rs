@@ -1,44 +1,93 @@
-//! Progressive photon mapping on Vulkan: a glTF scene in, an OpenEXR picture out.
+//! Progressive photon mapping on Vulkan: a glTF scene in, pictures out.
 //!
-//! # The life of a pass
+//! It renders what path tracers can't: light that passes glass, meets a matte surface and passes glass again. A [`Scene`] is
+//! read, [prepared](PreparedScene), and rendered by a [`Session`] until a limit is [reached](Until):
 //!
-//! [`scene::Scene::load`] reads a file, [`packing::PackedScene`] lays it out for the device. [`pipeline::Renderer`] uploads
-//! it and then repeats iterations, whose stages [`pipeline::Stages::iteration`] lists: `camera` finds visible points,
-//! `emission` starts photon paths, `photons` traces them, a method of [`gather::METHODS`] finds each visible point's
-//! photons, `direct` samples the lights, `update` shrinks the radii (the paper's equations 2 and 3). `resolve` makes the
-//! picture (equation 4), and [`film`] writes it.
+//! ```no_run
+//! use std::path::Path;
 //!
-//! [`record::Recording`] turns stages into commands with barriers; [`gpu`] alone knows Vulkan. [`cpu`] is a plain renderer in
-//! f64, made of the functions that kernels are tested against. ARCHITECTURE.md walks through the rest.
+//! use ppm_vk::{LoadOptions, Platform, PreparedScene, RenderConfig, Scene, Session, Until};
+//!
+//! fn main() -> ppm_vk::Result<()> {
+//!     let scene = Scene::load_with(Path::new("room.gltf"), LoadOptions::default())?;
+//!     for remark in &scene.warnings {
+//!         eprintln!("{remark}");
+//!     }
+//!     let camera = &scene.cameras[scene.camera_index(Some("by the window"))?];
+//!     let config = RenderConfig {
+//!         resolution: [640, 480],
+//!         photons: 500_000,
+//!         ..RenderConfig::default()
+//!     };
+//!     let prepared = PreparedScene::new(&scene)?;
+//!     let mut session = Session::new(&prepared, camera, &config, &Platform::default())?;
+//!
+//!     // Until its error is 2 % by its own estimate; then it may go on.
+//!     let rendered = session.render(Until::error(0.02))?;
+//!     rendered.write_exr(Path::new("room.exr"))?;
+//!     let better = session.render(Until::iterations(2 * rendered.iterations()))?;
+//!     better.write_png(Path::new("room.png"), 0.0)?;
+//!     if let Some(error) = better.error() {
+//!         println!("{error}");
+//!     }
+//!     Ok(())
+//! }
+//! ```
+//!
+//! A program that shows how far a render is, or stops it, gives [`Hooks`] to [`Session::render_with`].
+//!
+//! # Messages
+//!
+//! An [`Error`], a [`Warning`] and a [`Remark`] is one line that names no program's flags. Their kinds tell a program what to
+//! add: the [`Setting`] that is wrong, the [`Remedy`] that helps, the [`LoadChoice`] that decides otherwise.
+//!
+//! # Features
+//!
+//! `program`, on by default, is what the program `ppm-vk` needs besides: without it (`default-features = false`) no crate for
+//! command lines, progress bars, signals or plots is built. Building compiles the kernels by the shaderc library.
+//!
+//! ARCHITECTURE.md in the repository walks through the code.
 
-#![warn(missing_docs)]
+mod alias;
+mod backend;
+mod config;
+mod cpu;
+mod emission;
+mod error;
+mod estimate;
+mod files;
+mod film;
+mod gather;
+mod gpu;
+#[doc(hidden)]
+pub mod internals;
+mod kd_tree;
+mod layout;
+mod loader;
+mod metrics;
+mod packing;
+mod pipeline;
+mod radius;
+mod random;
+mod record;
+mod report;
+mod scene;
+mod session;
+mod shaders;
+mod sizes;
+mod stage;
+mod text;
 
-pub mod alias;
-pub mod backend;
-#[path = "../program/bench/mod.rs"]
-pub mod bench;
-#[path = "../program/cli/mod.rs"]
-pub mod cli;
-pub mod config;
-pub mod cpu;
-pub mod emission;
-pub mod error;
-pub mod estimate;
-pub mod files;
-pub mod film;
-pub mod gather;
-pub mod gpu;
-pub mod layout;
-pub mod loader;
-pub mod metrics;
-pub mod packing;
-pub mod pipeline;
-pub mod radius;
-pub mod random;
-pub mod record;
-pub mod report;
-pub mod scene;
-pub mod shaders;
-pub mod sizes;
-pub mod stage;
-pub mod text;
+pub use backend::{Counters, DeviceDescription};
+pub use config::{Accel, Choice, Direct, EmissionChoice, Estimator, RenderConfig, Sampler, TriangleTest};
+pub use error::{Error, Remedy, Result, Setting};
+pub use estimate::RelativeError;
+pub use film::{Image, read_exr};
+pub use gpu::{DeviceSummary, best_device, devices};
+pub use loader::{LightUnits, LoadOptions};
+pub use metrics::{Comparison, compare, flip};
+pub use pipeline::Memory;
+pub use record::Run;
+pub use report::{Profile, Subject};
+pub use scene::{Camera, Environment, Lens, LoadChoice, Remark, Scene};
+pub use session::{Failure, Hooks, Platform, PreparedScene, Progress, Rendered, Session, Until, Warning};

@@ -1,10 +1,7 @@
 //! The first radii, where the user gives none: in footprints of the pixels.
 
-use std::num::NonZero;
-
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-
 use crate::config::pixel_of;
+use crate::kd_tree::KdTree;
 use crate::layout::{CAUSTIC, NO_OBJECT, Photon, Statistics, VisiblePoint};
 
 /// How many photons a visible point may be wanted to accept in the first iteration. The first is what the others' blur is
@@ -217,26 +214,16 @@ fn nearest(
         .zip(footprints)
         .filter(|(point, _)| point.position_object[3].to_bits() != NO_OBJECT)
         .collect();
-    if positions.is_empty() {
-        return Vec::new();
-    }
-    let (Ok(tree), Some(asked)) = (ImmutableKdTree::new_from_slice(&positions), NonZero::new(4 * most)) else {
-        return Vec::new();
-    };
+    let tree = KdTree::new(&positions);
     let step = seen.len().div_ceil(PROBES).max(1);
     let probes = seen.iter().step_by(step).map(|&(point, &footprint)| {
         let position = [0, 1, 2].map(|axis| point.position_object[axis]);
         let object = point.position_object[3].to_bits();
-        let found = tree
-            .query(&position)
-            .nearest_n::<SquaredEuclidean<f32>>(asked)
-            .execute();
-        let on_object = found
-            .iter()
-            .filter(|near| object_of(photons[near.item as usize]) == object);
+        let found = tree.nearest(position, 4 * most).into_iter();
+        let on_object = found.filter(|&(_, photon)| object_of(photons[photon]) == object);
         Near {
             footprint,
-            distances2: on_object.map(|near| near.distance).take(most).collect(),
+            distances2: on_object.map(|(distance2, _)| distance2).take(most).collect(),
         }
     });
     // A photon at the very point says nothing of densities.

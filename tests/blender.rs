@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use ppm_vk::film::{Image, read_exr};
+use ppm_vk::internals::film::{Image, read_exr};
 use program::{ppm_vk, stderr};
 use tempfile::TempDir;
 
@@ -289,7 +289,7 @@ fn an_environment_is_scaled_and_rotated_where_there_is_one() {
     let wall = half_a_wall(folder.path());
     let flags = ["--environment-rotation", "90", "--environment-strength", "2"];
     let picture = |scene: &Path, flags: &[&str]| render(folder.path(), scene, flags);
-    let mean = |image: &Image| ppm_vk::metrics::mean(image)[1];
+    let mean = |image: &Image| ppm_vk::internals::metrics::mean(image)[1];
     let without_effect = |said: &str| said.lines().filter(|line| line.contains("without effect")).count();
 
     let ((once, _), (twice, said)) = (picture(&wall, &[]), picture(&wall, &flags[2..]));

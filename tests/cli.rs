@@ -92,7 +92,7 @@ fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
         all.extend(arguments);
         let output = ppm_vk(folder.path(), &all);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        pictures.push(ppm_vk::film::read_exr(&folder.path().join(file)).expect("picture"));
+        pictures.push(ppm_vk::internals::film::read_exr(&folder.path().join(file)).expect("picture"));
     }
     assert!(
         pictures[0] == pictures[1],
@@ -175,7 +175,7 @@ fn ctrl_c_writes_the_picture_and_exits_with_130() {
     let status = child.wait().expect("exit");
     assert_eq!(status.code(), Some(130));
     assert_eq!(files(folder.path()), ["o.exr"]);
-    ppm_vk::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
+    ppm_vk::internals::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
 }
 
 #[test]
@@ -508,7 +508,7 @@ fn signals_that_are_sent_twice_at_once_still_leave_the_picture() {
         send(signal, &child);
         assert_eq!(child.wait().expect("exit").code(), Some(130), "{signal}");
         assert_eq!(files(folder.path()), ["o.exr"], "{signal}");
-        ppm_vk::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
+        ppm_vk::internals::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
         std::fs::remove_file(folder.path().join("o.exr")).expect("removed");
     }
 }
@@ -523,8 +523,8 @@ fn an_iteration_that_is_too_long_is_cut_by_the_time_and_by_ctrl_c() {
         let timed = [&endless[..], &["--time", "0.5", "--backend", backend]].concat();
         let status = long_render(folder.path(), &timed).wait().expect("exit");
         assert_eq!(status.code(), Some(0), "{backend}");
-        let picture = ppm_vk::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
-        let mean = ppm_vk::metrics::mean(&picture)[1];
+        let picture = ppm_vk::internals::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
+        let mean = ppm_vk::internals::metrics::mean(&picture)[1];
         // Of the whole picture, whatever is seen in so few pixels.
         assert!(
             (0.2..0.8).contains(&mean),
@@ -578,9 +578,9 @@ fn extreme_radii_and_alphas_end_with_a_finite_picture() {
         arguments.extend(more);
         let output = ppm_vk(folder.path(), &arguments);
         assert_eq!(output.status.code(), Some(0), "{more:?}: {}", stderr(&output));
-        let image = ppm_vk::film::read_exr(&folder.path().join("o.exr")).expect("picture");
-        let defects = ppm_vk::metrics::defects(&image);
-        assert_eq!(defects, ppm_vk::metrics::Defects::default(), "{more:?}");
+        let image = ppm_vk::internals::film::read_exr(&folder.path().join("o.exr")).expect("picture");
+        let defects = ppm_vk::internals::metrics::defects(&image);
+        assert_eq!(defects, ppm_vk::internals::metrics::Defects::default(), "{more:?}");
         assert!(!stderr(&output).contains("NaN"), "{more:?}: {}", stderr(&output));
     }
 }
@@ -727,7 +727,7 @@ fn a_variant_and_a_scene_are_chosen_by_name() {
     let centre = |more: &[&str]| {
         let output = small_render(folder.path(), &scene, &[more, &["-o", "out.exr"]].concat());
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        let image = ppm_vk::film::read_exr(&folder.path().join("out.exr")).expect("picture");
+        let image = ppm_vk::internals::film::read_exr(&folder.path().join("out.exr")).expect("picture");
         let middle = image.pixels()[image.height() / 2 * image.width() + image.width() / 2];
         (middle, stderr(&output))
     };
@@ -782,9 +782,9 @@ fn an_environment_is_a_radiance_or_a_picture() {
         let more = ["--environment", environment, "-o", file];
         let output = small_render(folder.path(), &scene("lights.gltf"), &more);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        pictures.push(ppm_vk::film::read_exr(&folder.path().join(file)).expect("picture"));
+        pictures.push(ppm_vk::internals::film::read_exr(&folder.path().join(file)).expect("picture"));
     }
-    let [constant, picture] = [0, 1].map(|i| ppm_vk::metrics::mean(&pictures[i])[0]);
+    let [constant, picture] = [0, 1].map(|i| ppm_vk::internals::metrics::mean(&pictures[i])[0]);
     assert!(
         (picture / constant - 1.0).abs() < 0.1,
         "{picture} is not about {constant}"
@@ -838,8 +838,8 @@ fn an_environment_takes_no_more_memory_than_the_scene_may() {
 #[test]
 fn values_of_an_environment_that_are_no_radiance_are_counted() {
     let folder = TempDir::new().expect("folder");
-    let image = ppm_vk::film::Image::new(2, 1, vec![[f32::NAN, 1.0, -1.0], [1.0; 3]]);
-    let metadata = ppm_vk::film::Metadata {
+    let image = ppm_vk::internals::film::Image::new(2, 1, vec![[f32::NAN, 1.0, -1.0], [1.0; 3]]);
+    let metadata = ppm_vk::internals::film::Metadata {
         iterations: 1,
         photons_emitted: 0,
         seed: 0,
@@ -847,9 +847,9 @@ fn values_of_an_environment_that_are_no_radiance_are_counted() {
         seconds: 0.0,
         estimated_error: None,
     };
-    ppm_vk::film::write_exr(
+    ppm_vk::internals::film::write_exr(
         &image,
-        ppm_vk::film::Layers::default(),
+        ppm_vk::internals::film::Layers::default(),
         &folder.path().join("sky.exr"),
         &metadata,
     )

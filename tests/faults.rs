@@ -5,8 +5,8 @@ mod program;
 
 use std::path::{Path, PathBuf};
 
-use ppm_vk::film::read_exr;
-use ppm_vk::metrics::{Defects, defects};
+use ppm_vk::internals::film::read_exr;
+use ppm_vk::internals::metrics::{Defects, defects};
 use program::{ppm_vk, stderr};
 use serde_json::{Value, json};
 use tempfile::TempDir;

@@ -1,14 +1,14 @@
 //! Barriers of recorded commands, checked without a device by an argument of their own: between two commands that touch
 //! the same buffer, one of them writing, there is a barrier.
 
-use ppm_vk::config::RenderConfig;
-use ppm_vk::gather::METHODS;
-use ppm_vk::packing::SceneFeatures;
-use ppm_vk::pipeline::Stages;
-use ppm_vk::record::{Command, Recording};
-use ppm_vk::shaders;
-use ppm_vk::sizes::{Limits, Sizes};
-use ppm_vk::stage::{BufferId, StageDesc};
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::gather::METHODS;
+use ppm_vk::internals::packing::SceneFeatures;
+use ppm_vk::internals::pipeline::Stages;
+use ppm_vk::internals::record::{Command, Recording};
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::sizes::{Limits, Sizes};
+use ppm_vk::internals::stage::{BufferId, StageDesc};
 
 /// Pairs of commands (by index) that conflict without a barrier between them.
 fn unprotected(commands: &[Command]) -> Vec<(usize, usize)> {

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("folder") {
@@ -14,12 +15,18 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every source file under src, by its path there, and its code without comments.
+/// Every source file of the library, by its path under src, and its code without comments.
 fn code() -> Vec<(String, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let code = code_of("src");
+    assert!(code.len() > 20, "only {} source files found", code.len());
+    code
+}
+
+/// The same of a folder.
+fn code_of(folder: &str) -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let mut found = Vec::new();
     sources(&root, &mut found);
-    assert!(found.len() > 20, "only {} source files found", found.len());
     found
         .iter()
         .map(|path| {
@@ -59,7 +66,7 @@ fn imports_go_downward() {
                 "crate::gpu",
                 "crate::record",
                 "crate::pipeline",
-                "crate::cli",
+                "crate::session",
                 "crate::cpu",
             ],
         ),
@@ -69,7 +76,7 @@ fn imports_go_downward() {
                 "crate::scene",
                 "crate::gpu",
                 "crate::pipeline",
-                "crate::cli",
+                "crate::session",
                 "crate::cpu",
             ],
         ),
@@ -79,7 +86,7 @@ fn imports_go_downward() {
                 "crate::scene",
                 "crate::gpu",
                 "crate::pipeline",
-                "crate::cli",
+                "crate::session",
                 "crate::cpu",
             ],
         ),
@@ -88,7 +95,7 @@ fn imports_go_downward() {
             &[
                 "crate::scene",
                 "crate::pipeline",
-                "crate::cli",
+                "crate::session",
                 "crate::cpu",
                 "crate::gather",
             ],
@@ -102,7 +109,7 @@ fn imports_go_downward() {
                 "crate::gpu",
                 "crate::record",
                 "crate::pipeline",
-                "crate::cli",
+                "crate::session",
                 "crate::cpu",
             ],
         ),
@@ -112,11 +119,11 @@ fn imports_go_downward() {
                 "crate::gpu",
                 "crate::record",
                 "crate::pipeline",
-                "crate::cli",
+                "crate::session",
                 "crate::cpu",
             ],
         ),
-        ("cpu", &["crate::gpu", "crate::pipeline", "crate::cli"]),
+        ("cpu", &["crate::gpu", "crate::pipeline", "crate::session"]),
         (
             "scene",
             &[
@@ -146,12 +153,12 @@ fn imports_go_downward() {
                 "crate::loader",
                 "crate::gpu",
                 "crate::pipeline",
-                "crate::cli",
+                "crate::session",
                 "crate::cpu",
                 "crate::record",
             ],
         ),
-        ("pipeline", &["crate::cli", "crate::cpu", "crate::bench"]),
+        ("pipeline", &["crate::session", "crate::cpu"]),
         ("bench", &["crate::cli"]),
     ];
     for (file, text) in code() {
@@ -231,6 +238,83 @@ fn functions_that_kernels_call_in_loops_return_once() {
                 .lines()
                 .find(|line| line.ends_with(") {") || line.contains('('));
             assert!(returns <= 1, "glsl/{file}: {returns} returns in {}", name.unwrap_or(""));
+        }
+    }
+}
+
+/// What only the program needs.
+const OF_THE_PROGRAM: [&str; 6] = ["anyhow", "clap", "ctrlc", "indicatif", "plotters", "signal-hook"];
+
+#[test]
+fn the_library_builds_without_what_only_the_program_needs() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest = fs::read_to_string(root.join("Cargo.toml")).expect("Cargo.toml");
+    let dependencies = manifest
+        .split("\n[")
+        .filter(|table| table.starts_with("dependencies]") || table.contains("\".dependencies]"));
+    let lines: Vec<&str> = dependencies.flat_map(str::lines).collect();
+    for name in OF_THE_PROGRAM {
+        let line = lines.iter().find(|line| line.starts_with(&format!("{name} = ")));
+        let line = line.unwrap_or_else(|| panic!("{name} isn't among the dependencies"));
+        assert!(line.contains("optional = true"), "the library depends on {line}");
+    }
+    for (file, text) in code() {
+        for name in OF_THE_PROGRAM {
+            let name = name.replace('-', "_");
+            assert!(!text.contains(&format!("{name}::")), "src/{file} uses {name}");
+        }
+    }
+    let tree = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--no-default-features",
+            "--edges",
+            "normal",
+            "--prefix",
+            "none",
+            "--offline",
+        ])
+        .current_dir(root)
+        .output()
+        .expect("cargo tree");
+    assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
+    let tree = String::from_utf8_lossy(&tree.stdout);
+    assert!(tree.contains("ash v"), "no dependencies in:\n{tree}");
+    for name in OF_THE_PROGRAM {
+        let is_there = tree.lines().any(|line| line.starts_with(&format!("{name} v")));
+        assert!(
+            !is_there,
+            "a dependency of the library brings {name}: cargo tree --no-default-features -i {name}"
+        );
+    }
+}
+
+/// The program adds them: `program/cli/words.rs`.
+#[test]
+fn the_librarys_messages_name_no_flags() {
+    for (file, text) in code() {
+        for line in text.lines() {
+            let flag = line.match_indices("--").find(|(at, _)| {
+                let before = line[..*at].chars().next_back();
+                let after = line[at + 2..].chars().next();
+                before.is_none_or(|c| !c.is_alphanumeric() && c != '-') && after.is_some_and(|c| c.is_ascii_lowercase())
+            });
+            assert!(flag.is_none(), "src/{file} names a flag: {}", line.trim());
+        }
+    }
+}
+
+/// A render is a `Session`; only benches of its stages look inside.
+#[test]
+fn the_command_line_renders_by_the_public_interface() {
+    let code = code_of("program/cli");
+    assert!(code.len() > 5, "only {} source files found", code.len());
+    for (file, text) in code {
+        for module in [
+            "backend", "cpu", "emission", "gpu", "pipeline", "record", "session", "stage",
+        ] {
+            let module = format!("internals::{module}");
+            assert!(!text.contains(&module), "program/cli/{file} uses {module}");
         }
     }
 }

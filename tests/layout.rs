@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use ppm_vk::layout::layouts;
-use ppm_vk::shaders::{ALL, STRUCTS};
-use ppm_vk::stage::Access;
+use ppm_vk::internals::layout::layouts;
+use ppm_vk::internals::shaders::{ALL, STRUCTS};
+use ppm_vk::internals::stage::Access;
 
 #[test]
 fn every_struct_has_the_same_fields_in_rust_and_glsl() {

@@ -43,7 +43,7 @@ fn the_gather_bench_prints_tables_and_writes_its_files() {
     }
     let value: serde_json::Value = serde_json::from_slice(&std::fs::read(&files[0]).expect("JSON")).expect("JSON");
     let methods = value["resolutions"][0]["methods"].as_array().expect("methods");
-    assert_eq!(methods.len(), ppm_vk::gather::METHODS.len());
+    assert_eq!(methods.len(), ppm_vk::internals::gather::METHODS.len());
     for method in methods {
         assert!(method["gather_us"].as_f64().expect("a time") > 0.0, "{method}");
     }
@@ -105,14 +105,14 @@ fn compare_measures_a_picture_against_its_reference() {
 fn compare_tells_of_nan_in_json_too() {
     let folder = TempDir::new().expect("folder");
     let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/references/cornell.exr");
-    let mut image = ppm_vk::film::read_exr(std::path::Path::new(reference)).expect("the reference");
+    let mut image = ppm_vk::internals::film::read_exr(std::path::Path::new(reference)).expect("the reference");
     let mut pixels = image.pixels().to_vec();
     pixels[7][1] = f32::NAN;
-    image = ppm_vk::film::Image::new(image.width(), image.height(), pixels);
-    let metadata = ppm_vk::film::Metadata::default();
-    ppm_vk::film::write_exr(
+    image = ppm_vk::internals::film::Image::new(image.width(), image.height(), pixels);
+    let metadata = ppm_vk::internals::film::Metadata::default();
+    ppm_vk::internals::film::write_exr(
         &image,
-        ppm_vk::film::Layers::default(),
+        ppm_vk::internals::film::Layers::default(),
         &folder.path().join("nan.exr"),
         &metadata,
     )

@@ -8,12 +8,12 @@ mod fixture;
 #[path = "picture/mod.rs"]
 mod picture;
 
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Estimator, RenderConfig, Totals};
-use ppm_vk::gpu::best_device;
-use ppm_vk::packing::SceneFeatures;
-use ppm_vk::pipeline::{Memory, Stages};
-use ppm_vk::sizes::{Limits, Sizes};
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Estimator, RenderConfig, Totals};
+use ppm_vk::internals::gpu::best_device;
+use ppm_vk::internals::packing::SceneFeatures;
+use ppm_vk::internals::pipeline::{Memory, Stages};
+use ppm_vk::internals::sizes::{Limits, Sizes};
 use serde_json::json;
 
 use fixture::Fixture;

@@ -4,12 +4,12 @@
 #[path = "picture/mod.rs"]
 mod picture;
 
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Accel, Direct, EmissionChoice, RenderConfig};
-use ppm_vk::gather;
-use ppm_vk::gpu::Device;
-use ppm_vk::metrics::{Defects, compare, defects};
-use ppm_vk::packing::SceneFeatures;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Accel, Direct, EmissionChoice, RenderConfig};
+use ppm_vk::internals::gather;
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::metrics::{Defects, compare, defects};
+use ppm_vk::internals::packing::SceneFeatures;
 
 use picture::{Subject, reference, small};
 

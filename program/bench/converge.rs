@@ -5,16 +5,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::slope_text;
-use crate::backend::{Backend, DeviceDescription};
-use crate::config::RenderConfig;
-use crate::error::Result;
-use crate::estimate::{ErrorEstimate, of_one_photon};
-use crate::film::Image;
-use crate::gpu::Device;
-use crate::metrics::compare;
-use crate::packing::PackedScene;
-use crate::pipeline::Renderer;
-use crate::scene::Camera;
+use ppm_vk::{Camera, DeviceDescription, Image, Platform, PreparedScene, RenderConfig, Result, Session, compare};
 
 /// Iterations before which errors aren't taken for the fit: the radius has hardly moved.
 const FIRST_FITTED: u32 = 4;
@@ -22,11 +13,11 @@ const FIRST_FITTED: u32 = 4;
 /// What is rendered, and for how long.
 pub struct Converge<'a> {
     /// The scene.
-    pub scene: &'a PackedScene,
+    pub scene: &'a PreparedScene,
     /// Its camera.
     pub camera: &'a Camera,
-    /// Device, by index or a part of its name.
-    pub device: Option<&'a str>,
+    /// What it runs on.
+    pub platform: Platform,
     /// What the pictures should be; its size is theirs.
     pub reference: &'a Image,
     /// Seconds of rendering, for each setting.
@@ -94,9 +85,9 @@ pub fn converge(
             break;
         }
         note(name);
-        let mut renderer = Renderer::new(Device::open(what.device)?, what.scene, what.camera, config.clone())?;
+        let mut session = Session::new(what.scene, what.camera, config, &what.platform)?;
         let known = known.get_or_insert_with(|| Convergence {
-            device: renderer.device(),
+            device: session.device(),
             curves: Vec::new(),
         });
         known.curves.push(Curve {
@@ -104,7 +95,7 @@ pub fn converge(
             points: Vec::new(),
             slope: None,
         });
-        follow(what, &mut renderer, config, known, measured)?;
+        follow(what, &mut session, known, measured)?;
     }
     Ok(())
 }
@@ -112,22 +103,20 @@ pub fn converge(
 /// Adds points to the last curve for as long as there is time.
 fn follow(
     what: &Converge,
-    renderer: &mut Renderer,
-    config: &RenderConfig,
+    session: &mut Session,
     known: &mut Convergence,
     measured: &mut dyn FnMut(&Convergence) -> Result<()>,
 ) -> Result<()> {
-    let estimate = ErrorEstimate::new(config, of_one_photon(what.scene, renderer, config));
     let (mut wall_s, mut device_s) = (0.0, 0.0);
     let mut next = 1;
     loop {
         let begin = Instant::now();
         let stop = || (what.stop)() || wall_s + begin.elapsed().as_secs_f64() >= what.seconds;
-        let run = renderer.iterate_unless(&stop)?;
+        let run = session.iterate(&stop)?;
         wall_s += begin.elapsed().as_secs_f64();
         let launches = run.iter().flat_map(|run| &run.launches);
         device_s += launches.map(|launch| launch.duration_ns * 1e-9).sum::<f64>();
-        let iterations = renderer.iterations();
+        let iterations = session.iterations();
         let last = run.is_none() || wall_s >= what.seconds || (what.stop)();
         let is_known = known
             .curves
@@ -135,8 +124,8 @@ fn follow(
             .and_then(|curve| curve.points.last())
             .is_some_and(|point| point.iterations == iterations);
         if (iterations == next || last) && !is_known {
-            let picture = renderer.resolve_all()?;
-            let comparison = compare(&picture.image, what.reference)?;
+            let (picture, error) = session.picture()?;
+            let comparison = compare(&picture, what.reference)?;
             if let Some(curve) = known.curves.last_mut() {
                 curve.points.push(Measured {
                     iterations,
@@ -145,7 +134,7 @@ fn follow(
                     rel_mse: comparison.rel_mse,
                     rmse: comparison.rmse,
                     mean_ratio: comparison.mean_ratio,
-                    estimated_error: estimate.relative(iterations, &picture).map(|error| error.total),
+                    estimated_error: error.map(|error| error.total),
                     efficiency: 1.0 / (comparison.rel_mse * device_s),
                 });
                 let fitted = curve.points.iter().filter(|point| point.iterations >= FIRST_FITTED);

@@ -5,14 +5,8 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::median;
-use crate::backend::{Backend, DeviceDescription};
-use crate::config::RenderConfig;
-use crate::error::Result;
-use crate::gpu::Device;
-use crate::packing::PackedScene;
-use crate::packing::SceneFeatures;
-use crate::pipeline::Renderer;
-use crate::scene::Camera;
+use ppm_vk::internals::packing::{PackedScene, SceneFeatures};
+use ppm_vk::{Camera, DeviceDescription, Platform, PreparedScene, RenderConfig, Result, Session};
 
 /// Times of all sets of features.
 #[derive(Debug, Clone, Serialize)]
@@ -43,15 +37,16 @@ pub struct AddedFeature {
 /// # Errors
 /// Whatever a render can meet.
 pub fn feature_costs(
-    scene: &PackedScene,
+    scene: &PreparedScene,
     camera: &Camera,
-    device: Option<&str>,
+    platform: &Platform,
     config: &RenderConfig,
     repeats: u32,
     note: &dyn Fn(&str),
 ) -> Result<FeatureCosts> {
-    let own = scene.features.constants();
-    let mut sets = vec![("the scene's own".to_owned(), scene.features)];
+    let packed = scene.packed();
+    let own = packed.features.constants();
+    let mut sets = vec![("the scene's own".to_owned(), packed.features)];
     for (index, (name, present)) in own.into_iter().enumerate() {
         let mut values = own.map(|(_, present)| present);
         values[index] = true;
@@ -60,22 +55,22 @@ pub fn feature_costs(
         }
     }
     sets.push(("all".to_owned(), SceneFeatures::ALL));
-    let mut renderers = Vec::new();
+    let mut sessions = Vec::new();
     for (name, features) in &sets {
         note(name);
-        let scene = PackedScene {
+        let scene = scene.with(PackedScene {
             features: *features,
-            ..scene.clone()
-        };
-        let mut renderer = Renderer::new(Device::open(device)?, &scene, camera, config.clone())?;
+            ..packed.clone()
+        });
+        let mut session = Session::new(&scene, camera, config, platform)?;
         // The first iteration compiles, and finds out how much room photons need.
-        renderer.iterate()?;
-        renderers.push(renderer);
+        session.iterate(&|| false)?;
+        sessions.push(session);
     }
-    let mut times = vec![Vec::new(); renderers.len()];
+    let mut times = vec![Vec::new(); sessions.len()];
     for _ in 0..repeats {
-        for (renderer, times) in renderers.iter_mut().zip(&mut times) {
-            let run = renderer.iterate()?;
+        for (session, times) in sessions.iter_mut().zip(&mut times) {
+            let run = session.iterate(&|| false)?.unwrap_or_default();
             times.push(run.launches.iter().map(|launch| launch.duration_ns * 1e-6).sum::<f64>());
         }
     }
@@ -90,8 +85,8 @@ pub fn feature_costs(
         ),
     });
     Ok(FeatureCosts {
-        device: renderers[0].device(),
-        own: scene.features.names(),
+        device: sessions[0].device(),
+        own: scene.features(),
         own_ms: median(times[0].clone()),
         added: added.collect(),
     })

@@ -4,22 +4,17 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::median;
 use super::structure::{Structure, structure};
-use crate::backend::{Backend, DeviceDescription};
-use crate::config::RenderConfig;
-use crate::cpu::{self, SeenByKernels};
-use crate::error::{Error, Result};
-use crate::gather::{METHODS, Runs, Tests, is_gather_stage};
-use crate::gpu::Device;
-use crate::layout::{GATHERED_FOR, GROUP, Gathered, NO_OBJECT, Photon, VisiblePoint};
-use crate::packing::PackedScene;
-use crate::pipeline::Renderer;
-use crate::random::CameraTurn;
-use crate::record::Run;
-use crate::scene::Camera;
-use crate::sizes::{Probe, Sizes};
-use crate::stage::BufferId;
+use super::{median, stages_of};
+use ppm_vk::internals::backend::Backend as _;
+use ppm_vk::internals::cpu::{self, SeenByKernels};
+use ppm_vk::internals::gather::{METHODS, Runs, Tests, is_gather_stage};
+use ppm_vk::internals::layout::{GATHERED_FOR, GROUP, Gathered, NO_OBJECT, Photon, VisiblePoint};
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::random::CameraTurn;
+use ppm_vk::internals::sizes::{Probe, Sizes};
+use ppm_vk::internals::stage::BufferId;
+use ppm_vk::{Camera, DeviceDescription, Error, Platform, PreparedScene, RenderConfig, Result, Run, Session};
 
 /// Microseconds that one gather may take; a slower method is measured on a share of the visible points.
 const BUDGET_US: f64 = 1e6;
@@ -27,11 +22,11 @@ const BUDGET_US: f64 = 1e6;
 /// What is measured.
 pub struct GatherBench<'a> {
     /// The scene.
-    pub scene: &'a PackedScene,
+    pub scene: &'a PreparedScene,
     /// Its camera.
     pub camera: &'a Camera,
-    /// Device, by index or a part of its name.
-    pub device: Option<&'a str>,
+    /// What it runs on.
+    pub platform: Platform,
     /// Everything but the resolution.
     pub config: RenderConfig,
     /// Pixels, width and height.
@@ -145,13 +140,15 @@ impl GatherBench<'_> {
         let mut copy_bytes_per_s = f64::NAN;
         let mut device = None;
         for &resolution in &self.resolutions {
-            let mut renderer = self.renderer(resolution)?;
+            let mut session = self.session(resolution)?;
+            let on = session.device();
+            let renderer = stages_of(&mut session)?;
             if device.is_none() {
                 note("copy bandwidth");
                 copy_bytes_per_s = renderer.gpu().copy_bandwidth()?;
-                device = Some(renderer.device());
+                device = Some(on);
             }
-            resolutions.push(self.resolution(&mut renderer, resolution, note)?);
+            resolutions.push(self.resolution(renderer, resolution, note)?);
         }
         Ok(Results {
             device: device.ok_or_else(|| Error::Config("no resolution to measure".to_owned()))?,
@@ -162,16 +159,16 @@ impl GatherBench<'_> {
         })
     }
 
-    /// A renderer at this resolution, before its first iteration.
+    /// A session at this resolution, before its first iteration.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
-    pub fn renderer(&self, resolution: [u32; 2]) -> Result<Renderer> {
+    /// As [`Session::new`].
+    pub fn session(&self, resolution: [u32; 2]) -> Result<Session> {
         let config = RenderConfig {
             resolution,
             ..self.config.clone()
         };
-        Renderer::new(Device::open(self.device)?, self.scene, self.camera, config)
+        Session::new(self.scene, self.camera, &config, &self.platform)
     }
 
     fn resolution(
@@ -246,7 +243,7 @@ impl GatherBench<'_> {
             ..self.config.clone()
         };
         let photons = config.photons;
-        let mut plain = cpu::Renderer::new(self.scene, self.camera, config)?;
+        let mut plain = cpu::Renderer::new(self.scene.packed(), self.camera, config)?;
         // One more, to warm up.
         let median_of = |work: &mut dyn FnMut() -> f64| median((0..=self.repeats).map(|_| work()).skip(1).collect());
         steps.raytracing_us[1] = median_of(&mut || timed_us(|| plain.trace_camera_paths(CameraTurn::FIRST)).1);
@@ -264,7 +261,7 @@ fn input(renderer: &mut Renderer) -> Result<Input> {
         photons: renderer.gpu().download(BufferId::Photons, Some(count[0] as usize))?,
         expected: Vec::new(),
     };
-    let gathered = cpu::gather_kd_tree(&input.seen(), &input.photons)?;
+    let gathered = cpu::gather_kd_tree(&input.seen(), &input.photons);
     input.expected = gathered.iter().map(|gathered| gathered.count).collect();
     Ok(input)
 }
@@ -406,8 +403,7 @@ impl Measured {
             Runs::Device { .. } => phases(&renderer.gather(self.method, self.probe)?.0),
             Runs::CpuNaive => [0.0, 0.0, self.cpu_naive(input, self.probe.stride as usize)],
             Runs::CpuKdTree => {
-                let (found, us) = timed_us(|| cpu::gather_kd_tree(&input.seen(), &input.photons));
-                found?;
+                let (_, us) = timed_us(|| cpu::gather_kd_tree(&input.seen(), &input.photons));
                 [0.0, 0.0, us]
             }
         };

@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use crate::error::Result;
-use crate::gpu::Compiler;
-use crate::packing::SceneFeatures;
-use crate::shaders;
-use crate::sizes::clustered_run;
-use crate::stage::{Shader, StageDesc};
+use ppm_vk::internals::error::Result;
+use ppm_vk::internals::gpu::Compiler;
+use ppm_vk::internals::packing::SceneFeatures;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::sizes::clustered_run;
+use ppm_vk::internals::stage::{Shader, StageDesc};
 
 /// Kernels compiled for one set of features.
 #[derive(Debug, Clone, Serialize)]

@@ -14,15 +14,24 @@ mod scaling;
 mod structure;
 mod tables;
 
-pub use converge::{Converge, Convergence, Curve, Measured, Reached, converge, converge_table, csv, seconds_to};
-pub use features::{AddedFeature, FeatureCosts, feature_costs, features_table};
-pub use gather::{GatherBench, MethodResult, ResolutionResult, Results, StepTimes};
-pub use kernels::{CompiledKernel, CompiledKernels, compiled_kernels, kernels_table};
+pub use converge::{Converge, Curve, converge, converge_table, csv};
+pub use features::{feature_costs, features_table};
+pub use gather::GatherBench;
+pub use kernels::{compiled_kernels, kernels_table};
 pub use plot::{plot_convergence, plot_methods, plot_scaling};
-pub use random::{Across, Battery, ChiSquare, LIMIT, battery, battery_table};
-pub use scaling::{Point, Scaling, Series, scaling};
-pub use structure::{Clusters, Spread, Structure, cluster_picture};
+pub use random::{battery, battery_table};
+pub use scaling::scaling;
+pub use structure::cluster_picture;
 pub use tables::{scaling_table, tables};
+
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::{Error, Result, Session};
+
+/// The stages of a session, one by one.
+fn stages_of(session: &mut Session) -> Result<&mut Renderer> {
+    let on_cpu = || Error::Config("stages are measured on a Vulkan device alone".to_owned());
+    session.on_device().ok_or_else(on_cpu)
+}
 
 /// The middle one of the values, or the mean of the middle two; NaN if there is none.
 fn median(mut values: Vec<f64>) -> f64 {

@@ -6,7 +6,7 @@ use super::converge::Convergence;
 use super::gather::Results;
 use super::scaling::Scaling;
 use super::slope_text;
-use crate::error::{Error, Result};
+use ppm_vk::internals::error::{Error, Result};
 
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),

@@ -5,8 +5,8 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::config::Sampler;
-use crate::random::{PathKind, Random};
+use ppm_vk::internals::config::Sampler;
+use ppm_vk::internals::random::{PathKind, Random};
 
 /// Cells along each axis of the table of 2-, 3- and 4-tuples, as powers of two: some ten thousand cells in all.
 const DIGITS: [u32; 3] = [8, 5, 4];

@@ -3,15 +3,10 @@
 use serde::Serialize;
 
 use super::gather::GatherBench;
-use super::{log_slope, median};
-use crate::backend::{Backend, DeviceDescription};
-use crate::config::RenderConfig;
-use crate::error::{Error, Result};
-use crate::gather::METHODS;
-use crate::gpu::Device;
-use crate::pipeline::Renderer;
-use crate::record::Run;
-use crate::sizes::Probe;
+use super::{log_slope, median, stages_of};
+use ppm_vk::internals::gather::METHODS;
+use ppm_vk::internals::sizes::Probe;
+use ppm_vk::{DeviceDescription, Error, RenderConfig, Result, Run, Session};
 
 /// Photon paths of an iteration.
 const PHOTONS: [u32; 7] = [10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000];
@@ -63,13 +58,10 @@ pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> R
         .resolutions
         .first()
         .ok_or_else(|| Error::Config("no resolution to measure".to_owned()))?;
-    let renderer = bench.renderer([width, height])?;
-    let device = renderer.device();
-    let radius = bench
-        .config
-        .radius
-        .unwrap_or(f64::from(renderer.radius()) / bench.scene.scale);
-    drop(renderer);
+    let session = bench.session([width, height])?;
+    let device = session.device();
+    let radius = bench.config.radius.unwrap_or(session.radius());
+    drop(session);
     let near = |method: &usize| METHODS[*method].looks_nearby();
     let methods: Vec<usize> = bench.methods.iter().copied().filter(near).collect();
     if methods.is_empty() {
@@ -133,15 +125,15 @@ fn cost_us(bench: &GatherBench, config: RenderConfig) -> Result<f64> {
         if repeat == 0 && repeats == 1 {
             continue;
         }
-        let device = Device::open(bench.device)?;
-        let mut renderer = Renderer::new(device, bench.scene, bench.camera, config.clone())?;
+        let mut session = Session::new(bench.scene, bench.camera, &config, &bench.platform)?;
+        let renderer = stages_of(&mut session)?;
         // So that the photons' buffers fit and the kernels are there.
         renderer.trace()?;
         if let Some(method) = config.gather {
             renderer.trace()?;
             renderer.gather(method, Probe::default())?;
         }
-        times.push(gather_us(&renderer.iterate()?));
+        times.push(gather_us(&session.iterate(&|| false)?.unwrap_or_default()));
     }
     let warm = usize::from(times.len() > 1);
     Ok(median(times.split_off(warm)))
@@ -173,7 +165,7 @@ mod tests {
 
     #[test]
     fn only_building_and_gathering_counts() {
-        let launch = |stage, us: f64| crate::record::Launch {
+        let launch = |stage, us: f64| ppm_vk::internals::record::Launch {
             stage,
             begin_ns: 0.0,
             duration_ns: us * 1e3,

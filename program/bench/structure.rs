@@ -2,12 +2,12 @@
 
 use serde::Serialize;
 
-use crate::config::pixel_of;
-use crate::error::Result;
-use crate::film::Image;
-use crate::layout::{GROUP, NO_SLOT, StatusCounters};
-use crate::pipeline::Renderer;
-use crate::stage::BufferId;
+use ppm_vk::internals::config::pixel_of;
+use ppm_vk::internals::error::Result;
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::layout::{GROUP, NO_SLOT, StatusCounters};
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::stage::BufferId;
 
 /// Order statistics of some counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

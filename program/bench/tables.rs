@@ -6,7 +6,7 @@ use super::gather::{MethodResult, ResolutionResult, Results};
 use super::paper::{self, CPU_NAIVE, RESOLUTIONS, STEPS, TABLE_3, TABLE_4};
 use super::scaling::Scaling;
 use super::slope_text;
-use crate::gather::METHODS;
+use ppm_vk::internals::gather::METHODS;
 
 /// All tables.
 pub fn tables(results: &Results) -> String {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::bench::{BenchFeatures, BenchGather, BenchKernels, BenchRandom};
@@ -10,8 +11,9 @@ use super::compare::Compare;
 use super::converge::ConvergeArguments;
 use super::outputs::named;
 use super::scene::SceneArguments;
-use crate::config::{Accel, Direct, EmissionChoice, Estimator, RenderConfig, Sampler, TriangleTest, ranges};
-use crate::gather;
+use ppm_vk::internals::config::ranges;
+use ppm_vk::internals::gather;
+use ppm_vk::{Accel, Choice, Direct, EmissionChoice, Estimator, RenderConfig, Sampler, TriangleTest};
 
 /// Parts of the picture's larger side that the film is moved by at the most.
 const FARTHEST_SHIFT: f32 = 1000.0;
@@ -128,10 +130,10 @@ pub struct RenderArguments {
     #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.photons, value_parser = count)]
     pub photons: u32,
     /// New visible points each iteration, or the same ones all the time as in the paper.
-    #[arg(long, value_enum, default_value_t = RenderConfig::DEFAULT.estimator)]
+    #[arg(long, default_value_t = RenderConfig::DEFAULT.estimator, value_parser = choice::<Estimator>())]
     pub estimator: Estimator,
     /// Direct light by sampling the lights, or by photons as in the paper.
-    #[arg(long, value_enum, default_value_t = RenderConfig::DEFAULT.direct)]
+    #[arg(long, default_value_t = RenderConfig::DEFAULT.direct, value_parser = choice::<Direct>())]
     pub direct: Direct,
     /// Eq. 2's α: the part of an iteration's photons that a visible point keeps.
     #[arg(long, value_name = "A", default_value_t = RenderConfig::DEFAULT.alpha, allow_negative_numbers = true, value_parser = alpha)]
@@ -147,20 +149,20 @@ pub struct RenderArguments {
     #[arg(long, value_name = "N", value_parser = count)]
     pub cell_photons: Option<u32>,
     /// How rays meet triangles.
-    #[arg(long, value_enum, default_value_t = RenderConfig::DEFAULT.accel)]
+    #[arg(long, default_value_t = RenderConfig::DEFAULT.accel, value_parser = choice::<Accel>())]
     pub accel: Accel,
     /// How a ray is tested against a triangle: havel is the paper's test with precomputed planes.
-    #[arg(long, value_enum, default_value_t = RenderConfig::DEFAULT.triangle_test)]
+    #[arg(long, default_value_t = RenderConfig::DEFAULT.triangle_test, value_parser = choice::<TriangleTest>())]
     pub triangle_test: TriangleTest,
     /// Bounces of a camera or photon path at the most.
     #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.max_depth, value_parser = count)]
     pub max_depth: u32,
     /// Where photon paths start: learned from what the picture needs, or by the lights' power as in the paper
     /// [default: aimed, with --estimator ppm power].
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choice::<EmissionChoice>())]
     pub emission: Option<EmissionChoice>,
     /// Where the numbers of paths come from [default: sobol, with --estimator ppm independent].
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choice::<Sampler>())]
     pub sampler: Option<Sampler>,
     /// Seed: the same one on the same device gives the same picture, bit for bit (but for the paper's gathers that order
     /// photons by atomic counters).
@@ -184,6 +186,15 @@ pub struct RenderArguments {
     /// No progress bar.
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// A parser of the names of a setting's values.
+pub fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
+    let values = T::ALL.iter().map(|choice| {
+        let summary = choice.summary();
+        PossibleValue::new(choice.name()).help(summary.strip_suffix('.').unwrap_or(summary))
+    });
+    PossibleValuesParser::new(values).try_map(|name| T::named(&name).ok_or("no such value"))
 }
 
 pub fn resolution(text: &str) -> Result<[u32; 2], String> {

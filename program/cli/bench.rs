@@ -6,18 +6,17 @@ use anyhow::{Context, Result, ensure};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory};
 
+use ppm_vk::internals::film::{write_png, write_whole};
+use ppm_vk::internals::gather::{METHODS, method};
+use ppm_vk::internals::packing::SceneFeatures;
+use ppm_vk::internals::sizes::Probe;
+use ppm_vk::{EmissionChoice, Platform, PreparedScene, RenderConfig, Scene};
+
 use super::args::{Arguments, count, gather_method, png_file, positive, resolution};
 use super::outputs::{all, check_outputs, named};
 use super::scene::{SceneArguments, say_remarks};
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
-use crate::config::{EmissionChoice, RenderConfig};
-use crate::film::{write_png, write_whole};
-use crate::gather::{METHODS, method};
-use crate::packing::PackedScene;
-use crate::packing::SceneFeatures;
-use crate::scene::Scene;
-use crate::sizes::Probe;
 
 /// What is measured where the user names no scene.
 const CORNELL: [(&str, &[u8]); 2] = [
@@ -86,11 +85,11 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
     let scene = load(arguments.scene.as_deref(), &arguments.read)?;
     let inputs: Vec<&Path> = scene.files.iter().map(PathBuf::as_path).collect();
     check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
-    let packed = PackedScene::new(&scene).map_err(anyhow::Error::msg)?;
+    let prepared = PreparedScene::new(&scene)?;
     let bench = GatherBench {
-        scene: &packed,
+        scene: &prepared,
         camera: scene.cameras.first().context("a scene without a camera")?,
-        device: arguments.device.as_deref(),
+        platform: Platform::Vulkan(arguments.device.clone()),
         config: RenderConfig {
             photons: arguments.photons,
             radius: arguments.radius,
@@ -111,7 +110,7 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
         say!("bench: {what}");
     };
     // What took minutes to measure is printed first: nothing that comes after can lose it.
-    let (json, plot): (Vec<u8>, Box<dyn Fn() -> crate::error::Result<String>>) = if arguments.scaling {
+    let (json, plot): (Vec<u8>, Box<dyn Fn() -> ppm_vk::Result<String>>) = if arguments.scaling {
         let scaling = bench::scaling(&bench, arguments.most_photons, &note)?;
         print(&bench::scaling_table(&scaling))?;
         (
@@ -196,7 +195,7 @@ pub struct BenchFeatures {
 /// Measures what features cost that a scene doesn't need, prints the table.
 pub fn features(arguments: &BenchFeatures) -> Result<Outcome> {
     let scene = load(arguments.scene.as_deref(), &arguments.read)?;
-    let packed = PackedScene::new(&scene).map_err(anyhow::Error::msg)?;
+    let prepared = PreparedScene::new(&scene)?;
     let config = RenderConfig {
         resolution: arguments.resolution,
         photons: arguments.photons,
@@ -206,9 +205,9 @@ pub fn features(arguments: &BenchFeatures) -> Result<Outcome> {
         say!("bench: {what}");
     };
     let costs = bench::feature_costs(
-        &packed,
+        &prepared,
         &scene.cameras[0],
-        arguments.device.as_deref(),
+        &Platform::Vulkan(arguments.device.clone()),
         &config,
         arguments.repeats,
         &note,
@@ -290,10 +289,11 @@ fn load(path: Option<&Path>, read: &SceneArguments) -> Result<Scene> {
 
 fn write_clusters(bench: &GatherBench, file: &Path) -> Result<()> {
     let resolution = bench.resolutions.last().context("no resolution")?;
-    let mut renderer = bench.renderer(*resolution)?;
+    let mut session = bench.session(*resolution)?;
+    let renderer = session.on_device().context("no Vulkan device")?;
     renderer.trace()?;
     let cluster_grid = method("cluster-grid").context("no method cluster-grid")?;
     renderer.gather(cluster_grid, Probe::default())?;
-    let picture = bench::cluster_picture(&mut renderer)?;
+    let picture = bench::cluster_picture(renderer)?;
     Ok(write_png(&picture, file, 0.0)?)
 }

@@ -9,8 +9,8 @@ use serde_json::json;
 use super::args::png_file;
 use super::outputs::check_outputs;
 use super::{Outcome, print};
-use crate::film::{Image, read_exr, write_rgb8};
-use crate::metrics::{compare, defects, flip, relative_errors};
+use ppm_vk::internals::film::{Image, read_exr, write_rgb8};
+use ppm_vk::internals::metrics::{compare, defects, flip, relative_errors};
 
 /// `ppm-vk compare`.
 #[derive(Debug, Args)]

@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 
+use ppm_vk::internals::film::write_whole;
+use ppm_vk::internals::gather::METHODS;
+use ppm_vk::{Direct, EmissionChoice, Estimator, Platform, PreparedScene, RenderConfig, Sampler, read_exr};
+
 use super::args::{count, seconds};
 use super::outputs::{all, check_outputs, named};
 use super::scene::{SceneArguments, say_remarks};
 use super::{Outcome, interrupt, print};
 use crate::bench::{Converge, Curve, converge, converge_table, csv, plot_convergence};
-use crate::config::{Direct, EmissionChoice, Estimator, RenderConfig, Sampler};
-use crate::film::{read_exr, write_whole};
-use crate::gather::METHODS;
-use crate::packing::PackedScene;
 
 /// `ppm-vk converge`.
 #[derive(Debug, Args)]
@@ -139,7 +139,7 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
     inputs.extend(scene.files.iter().map(PathBuf::as_path));
     check_outputs(&inputs, outputs.into_iter().filter_map(|file| file.as_deref()))?;
     say_remarks(&scene);
-    let packed = PackedScene::new(&scene).map_err(|what| crate::error::Error::scene(&arguments.scene, what))?;
+    let prepared = PreparedScene::new(&scene)?;
     let side = |pixels: usize| u32::try_from(pixels).context("the reference is too large");
     let base = RenderConfig {
         resolution: [side(reference.width())?, side(reference.height())?],
@@ -148,9 +148,9 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
         ..RenderConfig::default()
     };
     let what = Converge {
-        scene: &packed,
+        scene: &prepared,
         camera: &scene.cameras[scene.camera_index(arguments.camera.as_deref())?],
-        device: arguments.device.as_deref(),
+        platform: Platform::Vulkan(arguments.device.clone()),
         reference: &reference,
         seconds: arguments.time.as_secs_f64(),
         settings: settings(&base, arguments.vary),

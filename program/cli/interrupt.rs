@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 
-use crate::files;
+use ppm_vk::internals::files;
 
 /// Signals that follow the one before within this time are the same request: `timeout` sends to the process and then to its group,
 /// and a key that is held repeats.

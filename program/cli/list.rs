@@ -6,21 +6,18 @@ use std::path::Path;
 use anyhow::Result;
 use serde_json::json;
 
+use ppm_vk::internals::gather::{METHODS, default_method};
+use ppm_vk::internals::scene::Surface;
+use ppm_vk::internals::text::escaped;
+use ppm_vk::{Memory, PreparedScene, RenderConfig, Scene, best_device};
+
 use super::progress::{BUILDING, while_showing};
-use super::render::default_resolution;
 use super::scene::SceneArguments;
-use crate::config::RenderConfig;
-use crate::gather::{METHODS, default_method};
-use crate::gpu;
-use crate::packing::PackedScene;
-use crate::pipeline::Memory;
-use crate::scene::Scene;
-use crate::scene::Surface;
-use crate::text::escaped;
+use super::words;
 
 /// `ppm-vk devices`.
 pub fn devices(as_json: bool) -> Result<String> {
-    let devices = gpu::devices()?;
+    let devices = ppm_vk::devices()?;
     if as_json {
         return Ok(serde_json::to_string_pretty(&devices)? + "\n");
     }
@@ -59,7 +56,12 @@ pub fn gathers() -> Result<String> {
     let mut text = String::new();
     for (index, method) in METHODS.iter().enumerate() {
         let default = if index == default_method() { " (default)" } else { "" };
-        writeln!(text, "{:<20} {}{default}", method.name, method.summary)?;
+        let backend = if method.stages().is_none() {
+            " (--backend cpu)"
+        } else {
+            ""
+        };
+        writeln!(text, "{:<20} {}{backend}{default}", method.name, method.summary)?;
         writeln!(text, "{:<20} {}", "", method.paper)?;
     }
     Ok(text)
@@ -68,12 +70,14 @@ pub fn gathers() -> Result<String> {
 /// `ppm-vk inspect`.
 pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<String> {
     let scene = read.load(path, false)?;
-    let packed = while_showing(BUILDING, false, || PackedScene::new(&scene))
-        .map_err(|what| crate::error::Error::scene(path, what))?;
-    let memory = memory(&scene, &packed);
+    let prepared = while_showing(BUILDING, false, || PreparedScene::new(&scene))?;
+    let memory = memory(&scene, &prepared);
+    let packed = prepared.packed();
     let count = |is: fn(&Surface) -> bool| scene.materials.iter().filter(|material| is(&material.surface)).count();
     let emissive = scene.emissive_triangle_count();
-    let notes: Vec<&String> = scene.notes.iter().chain(&packed.notes).collect();
+    let of_scene = scene.notes.iter().map(words::of_remark);
+    let notes: Vec<String> = of_scene.chain(prepared.notes().iter().cloned()).collect();
+    let warnings: Vec<String> = scene.warnings.iter().map(words::of_remark).collect();
     let to_world = |p: glam::Vec3| p.as_dvec3() / scene.normalisation.scale + scene.normalisation.centre;
     let (low, high) = scene.bounds();
     let (low, high) = (to_world(low), to_world(high));
@@ -106,7 +110,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
                 "photons": config.photons,
             })),
             "notes": notes,
-            "warnings": scene.warnings,
+            "warnings": warnings,
         });
         return Ok(serde_json::to_string_pretty(&value)? + "\n");
     }
@@ -182,7 +186,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     for note in notes {
         writeln!(text, "note         {note}")?;
     }
-    for warning in &scene.warnings {
+    for warning in &warnings {
         writeln!(text, "warning      {warning}")?;
     }
     Ok(text)
@@ -190,11 +194,8 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
 
 /// What a render of the first camera takes on the best device with the settings that it has where the user gives none;
 /// `None` where there is no device.
-fn memory(scene: &Scene, packed: &PackedScene) -> Option<(Memory, RenderConfig)> {
-    let config = RenderConfig {
-        resolution: default_resolution(&scene.cameras[0]),
-        ..RenderConfig::default()
-    };
-    let device = gpu::best_device().ok()?;
-    Some((Memory::of(packed, &config, &device), config))
+fn memory(scene: &Scene, prepared: &PreparedScene) -> Option<(Memory, RenderConfig)> {
+    let config = RenderConfig::of(&scene.cameras[0]);
+    let device = best_device().ok()?;
+    Some((prepared.memory(&config, &device), config))
 }

@@ -5,7 +5,7 @@ macro_rules! say {
     ($($text:tt)*) => {
         let _ = std::io::Write::write_fmt(
             &mut std::io::stderr(),
-            format_args!("{}\n", $crate::text::escaped(&format!($($text)*))),
+            format_args!("{}\n", ppm_vk::internals::text::escaped(&format!($($text)*))),
         );
     };
 }
@@ -20,15 +20,15 @@ mod outputs;
 mod progress;
 mod render;
 mod scene;
-mod work;
+pub mod words;
 
 use std::io::Write as _;
 
 use anyhow::Result;
 use clap::Parser;
 
-use crate::text;
 use args::{Arguments, Command};
+use ppm_vk::internals::text;
 
 /// How a command ended; the process's exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,53 +7,20 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::backend::Backend;
-
-/// Iterations from which an estimated error may end a render: fewer have too little to tell it from.
-const TRUSTED_FROM: u32 = 16;
-
-/// When a render stops.
-#[derive(Debug, Clone, Copy)]
-pub struct Limits {
-    /// After so many iterations.
-    pub iterations: Option<u32>,
-    /// After so much time.
-    pub time: Option<Duration>,
-    /// When the estimated relative error is no larger than this.
-    pub error: Option<f64>,
-}
-
-impl Limits {
-    /// The part of the render that is done, 0 to 1. `error` is the estimated relative error, where there is one.
-    pub fn done(&self, iterations: u32, elapsed: Duration, error: Option<f64>) -> f64 {
-        let by_iterations = self
-            .iterations
-            .map_or(0.0, |limit| f64::from(iterations) / f64::from(limit));
-        let by_time = self
-            .time
-            .map_or(0.0, |limit| elapsed.as_secs_f64() / limit.as_secs_f64());
-        // Errors fall about as the cube root of the iterations.
-        let by_error = self
-            .error
-            .zip(error)
-            .filter(|_| iterations >= TRUSTED_FROM)
-            .map_or(0.0, |(limit, error)| (limit / error.max(f64::MIN_POSITIVE)).powi(3));
-        by_iterations.max(by_time).max(by_error).min(1.0)
-    }
-}
+use ppm_vk::{Progress, Until};
 
 /// A bar on stderr; nothing where stderr is no terminal.
-pub struct Progress {
+pub struct Bar {
     bar: ProgressBar,
-    limits: Limits,
+    until: Until,
     start: Instant,
 }
 
 const STEPS: u64 = 1000;
 
-impl Progress {
+impl Bar {
     /// A bar for a render that begins now; invisible if `quiet`.
-    pub fn new(limits: Limits, quiet: bool) -> Self {
+    pub fn new(until: Until, quiet: bool) -> Self {
         let target = if quiet {
             ProgressDrawTarget::hidden()
         } else {
@@ -65,27 +32,27 @@ impl Progress {
         }
         Self {
             bar,
-            limits,
+            until,
             start: Instant::now(),
         }
     }
 
     /// Shows where the render is.
-    pub fn show(&self, backend: &dyn Backend, error: Option<f64>) {
-        let elapsed = self.start.elapsed();
-        let done = self.limits.done(backend.iterations(), elapsed, error);
+    pub fn show(&self, progress: Progress) {
+        let Progress {
+            iterations,
+            photons_emitted,
+            error,
+            done,
+        } = progress;
         self.bar.set_position((done * STEPS as f64) as u64);
-        let seconds = elapsed.as_secs_f64().max(1e-9);
-        let of = self
-            .limits
-            .iterations
-            .map_or(String::new(), |limit| format!("/{limit}"));
+        let seconds = self.start.elapsed().as_secs_f64().max(1e-9);
+        let of = self.until.iterations.map_or(String::new(), |limit| format!("/{limit}"));
         let left = if done > 0.0 { seconds * (1.0 - done) / done } else { 0.0 };
         let error = error.map_or(String::new(), |error| format!(", error about {:.1} %", 100.0 * error));
         self.bar.set_message(format!(
-            "{}{of} iterations{error}, {} photon paths/s, {} left",
-            backend.iterations(),
-            with_prefix(backend.emitted() as f64 / seconds),
+            "{iterations}{of} iterations{error}, {} photon paths/s, {} left",
+            with_prefix(photons_emitted as f64 / seconds),
             clock(left)
         ));
     }

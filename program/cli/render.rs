@@ -7,35 +7,27 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 use glam::Vec2;
 
+use ppm_vk::internals::files::Writing;
+use ppm_vk::internals::film;
+use ppm_vk::internals::gather::{self, METHODS, Runs};
+use ppm_vk::{
+    Camera, EmissionChoice, Estimator, Hooks, Platform, PreparedScene, RenderConfig, Rendered, Sampler, Session, Until,
+    Warning,
+};
+
 use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::outputs::{all, check_outputs};
-use super::progress::{BUILDING, Limits, Progress, while_showing, with_prefix};
+use super::progress::{BUILDING, Bar, while_showing, with_prefix};
 use super::scene::say_remarks;
-use super::work::{Rendered, Work};
-use super::{Outcome, interrupt};
-use crate::backend::Backend;
-use crate::config::{EmissionChoice, Estimator, RenderConfig, Sampler};
-use crate::estimate::{ErrorEstimate, RelativeError, of_one_photon};
-use crate::files::Writing;
-use crate::film::{self, Image, Metadata};
-use crate::gather::{self, METHODS, Runs};
-use crate::gpu::Device;
-use crate::packing::PackedScene;
-use crate::pipeline::Renderer;
-use crate::report::Subject;
-use crate::scene::Camera;
+use super::{Outcome, interrupt, words};
 
-/// Width of a picture without --resolution.
-const DEFAULT_WIDTH: u32 = RenderConfig::DEFAULT.resolution[0];
-/// Aspect ratio where neither the user nor the camera gives one.
-const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
 /// Iterations where the user gives neither them nor a time.
 const DEFAULT_ITERATIONS: u32 = 64;
 
 /// The render command.
 pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let path = arguments.scene.as_deref().context("--scene is missing")?;
-    let (backend_choice, gather) = choose_backend(arguments);
+    let (platform, gather) = choose_platform(arguments);
     let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
     // Before any work: nobody wants to learn after an hour that the picture can't be written.
     check_outputs(&arguments.read.inputs(path), outputs(arguments, &output))?;
@@ -54,42 +46,21 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     if let Some([x, y]) = arguments.shift {
         camera.shift = Vec2::new(x, y);
     }
-    let camera = &camera;
-    let config = config(arguments, gather, camera);
-    let packed = while_showing(BUILDING, quiet, || PackedScene::new(&scene))
-        .map_err(|what| crate::error::Error::scene(path, what))?;
-    for note in &packed.notes {
+    let config = config(arguments, gather, &camera);
+    let prepared = while_showing(BUILDING, quiet, || PreparedScene::new(&scene))?;
+    for note in prepared.notes() {
         say!("note: {note}");
     }
-    let features = &packed.features;
-    let chooses = features.dispersion || features.alpha || features.partly_clear || features.coat || features.soft;
-    if config.estimator == Estimator::Ppm && chooses {
-        say!(
-            "warning: --estimator ppm finds visible points once: where a wavelength, alpha, a coat, a part of the light or a place \
-             on a lamp is chosen by chance, each pixel keeps its first choice, and the picture stays grainy there, however long it \
-             renders; use --estimator sppm"
-        );
-    }
-    let mut backend = open(backend_choice, arguments.device.as_deref(), &packed, camera, &config)?;
+    let mut session = Session::new(&prepared, &camera, &config, &platform)?;
+    say_warnings(session.warnings());
     if arguments.radius.is_none() {
-        say!(
-            "initial radius {:.6} scene units (automatic)",
-            f64::from(backend.radius()) / packed.scale
-        );
+        say!("initial radius {:.6} scene units (automatic)", session.radius());
     }
-    let on_device = backend_choice == BackendChoice::Vulkan;
-    if on_device && config.emission == EmissionChoice::Aimed && !backend.aims() {
+    if config.emission == EmissionChoice::Aimed && !session.is_aimed() {
         say!("photon paths start in proportion to the lights' power: aiming them isn't worth its cost in this scene");
     }
-    let specular = features.mirror || features.dielectric;
-    if on_device && specular && config.estimator == Estimator::Sppm && backend.photon_maps() == 1 {
-        say!(
-            "caustics have the radii of other light: at this --resolution a photon map of their own is larger than the device \
-             binds"
-        );
-    }
 
-    let limits = Limits {
+    let until = Until {
         iterations: arguments.iterations.or_else(|| {
             let endless = arguments.time.is_none() && arguments.target_error.is_none();
             endless.then_some(DEFAULT_ITERATIONS)
@@ -97,38 +68,17 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         time: arguments.time,
         error: arguments.target_error,
     };
-    let work = Work {
-        limits,
-        estimate: ErrorEstimate::new(&config, of_one_photon(&packed, backend.as_ref(), &config)),
-        profiled: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
-        asked: &interrupt::asked,
+    let bar = Bar::new(until, quiet);
+    let hooks = Hooks {
+        stop: &interrupt::asked,
+        progress: &|progress| bar.show(progress),
+        profile: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
     };
-    let progress = Progress::new(limits, quiet);
-    let rendered = work.run(backend.as_mut(), &|backend, error| progress.show(backend, error));
-    progress.finish();
+    let rendered = session.render_with(until, &hooks);
+    bar.finish();
     let rendered = rendered?;
-    let subject = Subject {
-        scene: scene.name.clone(),
-        resolution: config.resolution,
-        gather: METHODS[gather].name.to_owned(),
-        photons: config.photons,
-        photons_emitted: rendered.emitted,
-        device: backend.device(),
-        counters: backend.counters(),
-    };
-    for warning in backend.counters().warnings(rendered.emitted, config.max_depth) {
-        say!("warning: {warning}");
-    }
-    if let Some(note) = backend.counters().note(rendered.emitted, config.max_depth) {
-        say!("{note}");
-    }
-    if is_black(&rendered.picture.image) {
-        say!(
-            "warning: the picture is black: no light has come to what the camera sees; is there a light that shines there, and \
-             nothing before the camera?"
-        );
-    }
-    write_outputs(arguments, &output, &work.estimate, &rendered, &subject)?;
+    say_warnings(&rendered.warnings());
+    write_outputs(arguments, &output, &rendered)?;
     Ok(if interrupt::asked() {
         Outcome::Interrupted
     } else {
@@ -140,41 +90,20 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
 ///
 /// # Errors
 /// All that failed, the render itself among it, in one line.
-fn write_outputs(
-    arguments: &RenderArguments,
-    output: &Path,
-    estimate: &ErrorEstimate,
-    rendered: &Rendered,
-    subject: &Subject,
-) -> Result<()> {
+fn write_outputs(arguments: &RenderArguments, output: &Path, rendered: &Rendered) -> Result<()> {
     let _writing = Writing::begin();
-    let image = &rendered.picture.image;
-    let error = estimate.relative(rendered.iterations, &rendered.picture);
-    let metadata = Metadata {
-        iterations: u64::from(rendered.iterations),
-        photons_emitted: rendered.emitted,
-        seed: u64::from(arguments.seed),
-        device: subject.device.name.clone(),
-        seconds: rendered.seconds,
-        estimated_error: error.map(|error| error.total),
-    };
-    let errors = estimate.of_pixels(rendered.iterations, &rendered.picture);
-    let layers = film::Layers {
-        alpha: Some(&rendered.picture.alpha),
-        errors: errors.as_ref(),
-    };
-    let picture = film::write_exr(image, layers, output, &metadata);
+    let picture = rendered.write_exr(output);
     if picture.is_ok() {
-        say_rendered(output, rendered, subject, error);
+        say_rendered(output, rendered);
     }
-    let (png, profile) = (arguments.png.as_ref(), &rendered.profile);
+    let (png, profile, subject) = (arguments.png.as_ref(), rendered.profile(), rendered.subject());
     let json = |file: &Option<PathBuf>, value: &dyn Fn() -> serde_json::Value| {
         file.as_ref().map(|file| write_json(file, &value()))
     };
     let written = [
-        rendered.failure.clone().map(|failure| Err(Error::msg(failure))),
+        rendered.failure().map(|failure| Err(words::of_failure(failure))),
         Some(picture.map_err(Error::from)),
-        png.map(|file| Ok(film::write_png(image, file, arguments.exposure)?)),
+        png.map(|file| Ok(rendered.write_png(file, arguments.exposure)?)),
         arguments
             .profile
             .then(|| super::print(&profile.table(subject)).map(|_| ())),
@@ -184,20 +113,24 @@ fn write_outputs(
     all(written.into_iter().flatten())
 }
 
-fn is_black(image: &Image) -> bool {
-    image.pixels().iter().flatten().all(|&value| value == 0.0)
+fn say_warnings(warnings: &[Warning]) {
+    for warning in warnings {
+        let kind = if warning.is_slight() { "note" } else { "warning" };
+        say!("{kind}: {}", words::of_warning(warning));
+    }
 }
 
-fn say_rendered(output: &Path, rendered: &Rendered, subject: &Subject, error: Option<RelativeError>) {
+fn say_rendered(output: &Path, rendered: &Rendered) {
+    let subject = rendered.subject();
     let [width, height] = subject.resolution;
+    let (emitted, seconds) = (subject.photons_emitted, rendered.seconds());
+    let error = rendered.error();
     say!(
-        "{}: {width}x{height}, {} iterations, {} photon paths ({}), {:.1} s ({} photon paths/s) on {}{}",
+        "{}: {width}x{height}, {} iterations, {emitted} photon paths ({}), {seconds:.1} s ({} photon paths/s) on {}{}",
         output.display(),
-        rendered.iterations,
-        rendered.emitted,
+        rendered.iterations(),
         subject.counters.photons(),
-        rendered.seconds,
-        with_prefix(rendered.emitted as f64 / rendered.seconds),
+        with_prefix(emitted as f64 / seconds),
         subject.device.name,
         error.map_or(String::new(), |error| format!("; {error}")),
     );
@@ -215,7 +148,7 @@ fn write_json(file: &Path, value: &serde_json::Value) -> Result<()> {
 }
 
 /// What computes, and the gather method: each follows the other where the user names one alone.
-fn choose_backend(arguments: &RenderArguments) -> (BackendChoice, usize) {
+fn choose_platform(arguments: &RenderArguments) -> (Platform, usize) {
     let of_method = |method: usize| match METHODS[method].runs {
         Runs::Device { .. } => BackendChoice::Vulkan,
         Runs::CpuKdTree | Runs::CpuNaive => BackendChoice::Cpu,
@@ -241,28 +174,16 @@ fn choose_backend(arguments: &RenderArguments) -> (BackendChoice, usize) {
     if let Some(text) = conflict {
         Arguments::command().error(ErrorKind::ArgumentConflict, text).exit();
     }
-    (backend, method)
-}
-
-fn open(
-    backend: BackendChoice,
-    device: Option<&str>,
-    scene: &PackedScene,
-    camera: &Camera,
-    config: &RenderConfig,
-) -> Result<Box<dyn Backend>> {
-    Ok(match backend {
-        BackendChoice::Vulkan => {
-            let device = Device::open(device)?;
-            Box::new(Renderer::new(device, scene, camera, config.clone())?)
-        }
-        BackendChoice::Cpu => Box::new(crate::cpu::Renderer::new(scene, camera, config.clone())?),
-    })
+    let platform = match backend {
+        BackendChoice::Vulkan => Platform::Vulkan(arguments.device.clone()),
+        BackendChoice::Cpu => Platform::Cpu,
+    };
+    (platform, method)
 }
 
 fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> RenderConfig {
     RenderConfig {
-        resolution: arguments.resolution.unwrap_or_else(|| default_resolution(camera)),
+        resolution: arguments.resolution.unwrap_or(RenderConfig::of(camera).resolution),
         photons: arguments.photons,
         estimator: arguments.estimator,
         direct: arguments.direct,
@@ -279,12 +200,6 @@ fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> Render
         sampler: arguments.sampler.unwrap_or(Sampler::of(arguments.estimator)),
         seed: arguments.seed,
     }
-}
-
-/// A picture's size where the user gives none.
-pub fn default_resolution(camera: &Camera) -> [u32; 2] {
-    let height = DEFAULT_WIDTH as f32 / camera.aspect.unwrap_or(DEFAULT_ASPECT);
-    [DEFAULT_WIDTH, (height.round() as u32).clamp(1, crate::config::MAX_SIDE)]
 }
 
 /// The scene's name with `.exr`, in the current folder.

@@ -2,17 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use clap::Args;
 
-use super::args::{number, positive};
+use super::args::{choice, number, positive};
 use super::progress::{READING, while_showing};
-use crate::error::Error;
-use crate::loader::LightUnits;
-use crate::loader::LoadOptions;
-use crate::loader::MEMORY_LIMIT;
-use crate::scene::Environment;
-use crate::scene::Scene;
+use super::words;
+use ppm_vk::internals::loader::MEMORY_LIMIT;
+use ppm_vk::{Environment, LightUnits, LoadOptions, Scene};
 
 /// How a scene's file is read.
 #[derive(Debug, Args)]
@@ -41,7 +38,7 @@ pub struct SceneArguments {
     environment_strength: f64,
     /// Units of points, spots and suns (KHR_lights_punctual): as the specification has them; 683 times as large as Blender's
     /// exporter writes them unless told «Unitless»; or by the exporter that the file names.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value_t, value_parser = choice::<LightUnits>())]
     light_units: LightUnits,
     /// Take closed meshes of glass without a volume (KHR_materials_transmission alone, as Blender exports glass) as solid
     /// [default: thin walls, as glTF has it].
@@ -118,7 +115,7 @@ impl SceneArguments {
         let is_asked = [self.environment_rotation != 0.0, self.environment_strength != 1.0];
         if let Some(environment) = scene.environment.take() {
             let scaled = environment.scaled(self.environment_strength);
-            let scaled = scaled.map_err(|what| Error::Config(format!("--environment-strength: {what}")))?;
+            let scaled = scaled.map_err(|what| anyhow!("--environment-strength: {what}"))?;
             scene.environment = Some(scaled.rotated(self.environment_rotation));
         } else if is_asked != [false; 2] {
             let flags = ["--environment-rotation", "--environment-strength"];
@@ -128,13 +125,14 @@ impl SceneArguments {
                 .filter(|(_, is)| *is)
                 .map(|(flag, _)| flag)
                 .collect();
-            scene.notes.push(format!(
+            let note = format!(
                 "{} without effect: nothing surrounds the scene (--environment FILE or R,G,B)",
                 match flags[..] {
                     [one] => format!("{one} is"),
                     _ => format!("{} are", flags.join(" and ")),
                 }
-            ));
+            );
+            scene.notes.push(note.into());
         }
         Ok(())
     }
@@ -143,10 +141,10 @@ impl SceneArguments {
 /// Says what a user should know of a scene.
 pub fn say_remarks(scene: &Scene) {
     for note in &scene.notes {
-        say!("note: {note}");
+        say!("note: {}", words::of_remark(note));
     }
     for warning in &scene.warnings {
-        say!("warning: {warning}");
+        say!("warning: {}", words::of_remark(warning));
     }
 }
 

@@ -1,4 +1,4 @@
-//! Light of one wavelength. `glsl/shared/dispersion.glsl` cites the sources.
+//! Light of one wavelength. `glsl/bsdf/dispersion.glsl` cites the sources.
 
 use glam::{DVec3, dvec3};
 

@@ -1,4 +1,4 @@
-//! What shines from afar: `glsl/shared/environment.glsl` in f64.
+//! What shines from afar: `glsl/lights/environment.glsl` in f64.
 
 use std::f64::consts::PI;
 

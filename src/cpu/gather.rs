@@ -1,13 +1,12 @@
 //! The photons within each visible point's radius: by testing each, and by a kd-tree as the paper's CPU version.
 
 use glam::DVec3;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 
 use super::reflector::Reflector;
 use super::sampling::decode_direction;
 use super::vector::{mean, word, xyz};
-use crate::error::{Error, Result};
+use crate::kd_tree::KdTree;
 use crate::layout::{CAUSTIC, Gloss, NO_OBJECT, Photon, VisiblePoint};
 
 /// How much farther than R the kd-tree is asked: more than the rounding of the squared distance, which the tree and
@@ -152,20 +151,10 @@ pub fn gather_naive<R: Receivers>(receivers: &R, photons: &[Photon]) -> Vec<Gath
 }
 
 /// The same by asking a kd-tree for those nearby: the paper's CPU version.
-///
-/// # Errors
-/// [`Error::Config`] if there are more photons than the tree can number.
-pub fn gather_kd_tree<R: Receivers>(receivers: &R, photons: &[Photon]) -> Result<Vec<Gathered>> {
-    if photons.is_empty() {
-        return Ok(vec![Gathered::default(); receivers.count()]);
-    }
+pub fn gather_kd_tree<R: Receivers>(receivers: &R, photons: &[Photon]) -> Vec<Gathered> {
     let positions: Vec<[f32; 3]> = photons.iter().map(position).collect();
-    let tree = ImmutableKdTree::new_from_slice(&positions)
-        .map_err(|error| Error::Config(format!("kd-tree: {error}; try fewer --photons")))?;
-    Ok(gather(receivers, photons, |receiver, visit| {
-        tree.query(&receiver.position)
-            .within::<SquaredEuclidean<f32>>(receiver.radius2 * MARGIN)
-            .unsorted()
-            .visit(|found| visit(found.item as usize));
-    }))
+    let tree = KdTree::new(&positions);
+    gather(receivers, photons, |receiver, visit| {
+        tree.within(receiver.position, receiver.radius2 * MARGIN, visit);
+    })
 }

@@ -1,4 +1,4 @@
-//! The solid dielectrics that a ray is in: the counterpart of `glsl/shared/media.glsl`.
+//! The solid dielectrics that a ray is in: the counterpart of `glsl/trace/media.glsl`.
 
 use glam::DVec3;
 

@@ -1,5 +1,5 @@
 //! Glossy reflection as glTF 2.0, appendix B, has it: a Lambertian base under a boundary of GGX microfacets.
-//! `glsl/shared/gloss.glsl` cites the sources.
+//! `glsl/bsdf/microfacet.glsl` cites the sources.
 
 use std::f64::consts::PI;
 

@@ -18,7 +18,7 @@ use super::statistics::Statistics;
 use super::vector::{mean, with_word};
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Direct, Estimator, RenderConfig, SEQUENCES, Totals, iterations_of};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gather::{METHODS, Runs, default_cpu_method};
 use crate::layout::{self, COVERAGE_TRUSTED, COVERAGE_WHOLE, Photon, Settings};
 use crate::packing::PackedScene;
@@ -60,10 +60,8 @@ impl Renderer {
         config.check()?;
         let method = &METHODS[config.gather.unwrap_or_else(default_cpu_method)];
         if method.stages().is_some() {
-            return Err(Error::Config(format!(
-                "--gather {}: runs on a Vulkan device; leave out --backend cpu",
-                method.name
-            )));
+            let what = format!("{}: runs on a Vulkan device alone", method.name);
+            return Err(Error::setting(Setting::Gather, what));
         }
         let splits = scene.features.dielectric || scene.features.glossy;
         let room = match config.estimator {
@@ -135,14 +133,14 @@ impl Renderer {
         (photons.concat(), ended)
     }
 
-    fn gather(&self, photons: &[Photon]) -> Result<Vec<Gathered>> {
+    fn gather(&self, photons: &[Photon]) -> Vec<Gathered> {
         let discs = Discs {
             paths: &self.paths,
             slots: &self.slots,
             room: self.room,
         };
         match METHODS[self.config.gather.unwrap_or_else(default_cpu_method)].runs {
-            Runs::CpuNaive => Ok(gather_naive(&discs, photons)),
+            Runs::CpuNaive => gather_naive(&discs, photons),
             _ => gather_kd_tree(&discs, photons),
         }
     }
@@ -169,7 +167,7 @@ impl Renderer {
             let wanted = f64::from(first.photons as f32 * share);
             for _ in 0..radius::FITS {
                 self.find_discs();
-                let gathered = self.gather(&photons)?;
+                let gathered = self.gather(&photons);
                 for (index, gathered) in gathered.iter().enumerate() {
                     let found = f64::from(gathered.count);
                     if found > wanted {
@@ -344,7 +342,7 @@ impl Backend for Renderer {
             let (photons, of_batch) = clock.time("photons", || self.trace_photon_paths(iteration, batch));
             ended = [ended[0] + of_batch[0], ended[1] + of_batch[1]];
             stored += photons.len() as u64;
-            let accepted = clock.time("gather", || self.gather(&photons))?;
+            let accepted = clock.time("gather", || self.gather(&photons));
             gathered.iter_mut().zip(&accepted).for_each(|(sum, part)| sum.add(part));
         }
         clock.time("direct", || self.add_direct(turn));

@@ -1,4 +1,4 @@
-//! Directions and points from uniform numbers, and directions in 32 bits: `glsl/shared/sampling.glsl` in f64.
+//! Directions and points from uniform numbers, and directions in 32 bits: `glsl/common/sampling.glsl` in f64.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! What a surface's material is at a place: `glsl/shared/texture.glsl`, and `glsl/shared/alpha.glsl`.
+//! What a surface's material is at a place: `glsl/bsdf/material.glsl`, and `glsl/trace/opacity.glsl`.
 
 use glam::{DVec2, DVec3, DVec4};
 use half::f16;

@@ -2,8 +2,6 @@
 
 use super::{Image, write_whole};
 use crate::error::{Error, Result};
-use image::ImageEncoder as _;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use std::path::Path;
 
 /// Writes an 8-bit sRGB PNG: radiance times 2^`exposure_ev`, the Khronos PBR Neutral tone mapper, the sRGB transfer
@@ -32,8 +30,15 @@ pub fn write_rgb8(size: [usize; 2], bytes: &[u8], path: &Path) -> Result<()> {
     let cannot_encode = |what: String| Error::file(path, format!("can't be encoded as PNG: {what}"));
     let side = |pixels: usize| u32::try_from(pixels).map_err(|error| cannot_encode(error.to_string()));
     let mut file = Vec::new();
-    PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive)
-        .write_image(bytes, side(size[0])?, side(size[1])?, image::ExtendedColorType::Rgb8)
+    let mut encoder = png::Encoder::new(&mut file, side(size[0])?, side(size[1])?);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_filter(png::Filter::Adaptive);
+    encoder
+        .write_header()
+        .and_then(|mut writer| {
+            writer.write_image_data(bytes)?;
+            writer.finish()
+        })
         .map_err(|error| cannot_encode(error.to_string()))?;
     write_whole(path, &file)
 }

@@ -160,13 +160,13 @@ pub const METHODS: &[GatherMethod] = &[
     },
     GatherMethod {
         name: "cpu-kdtree",
-        summary: "a kd-tree on the CPU, all threads (--backend cpu)",
+        summary: "a kd-tree on the CPU, all threads",
         paper: "tables 1 and 2, column «CPU»",
         runs: Runs::CpuKdTree,
     },
     GatherMethod {
         name: "cpu-naive",
-        summary: "every visible point tests every photon on the CPU, all threads (--backend cpu)",
+        summary: "every visible point tests every photon on the CPU, all threads",
         paper: "section 6, 68 seconds",
         runs: Runs::CpuNaive,
     },

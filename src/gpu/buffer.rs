@@ -5,7 +5,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
 use super::context::{Context, OrVulkan};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::text;
 
 pub(super) struct Buffer {
@@ -49,11 +49,11 @@ impl Buffer {
                 })
                 .map_err(|error| {
                     context.device.destroy_buffer(handle, None);
-                    Error::Device(format!(
-                        "no memory for {name}, {} beside what there is already: {error}; try fewer --photons or a smaller \
-                         --resolution",
+                    let what = format!(
+                        "no memory for {name}, {} beside what there is already: {error}",
                         text::bytes(bytes.max(4))
-                    ))
+                    );
+                    Error::unfit(what, Remedy::SmallerRender)
                 })?;
             context
                 .device

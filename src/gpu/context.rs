@@ -9,7 +9,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::shaders;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -114,11 +114,8 @@ impl Instance {
     /// Loads Vulkan. Debug builds turn on the validation layer where it is installed.
     fn new() -> Result<Self> {
         // SAFETY: the loader is the system's own.
-        let entry = unsafe { ash::Entry::load() }.map_err(|error| {
-            Error::Device(format!(
-                "no Vulkan loader: {error}; install one (Debian: libvulkan1 mesa-vulkan-drivers) or use --backend cpu"
-            ))
-        })?;
+        let entry = unsafe { ash::Entry::load() }
+            .map_err(|error| Error::unfit(format!("no Vulkan loader: {error}"), Remedy::InstallLoader))?;
         let messages = Messages::default();
         // SAFETY: plain Vulkan calls on a live entry; pointers outlive the calls.
         unsafe {
@@ -165,11 +162,9 @@ impl Instance {
             if portability {
                 create = create.flags(vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR);
             }
-            let handle = entry.create_instance(&create, None).map_err(|code| {
-                Error::Device(format!(
-                    "no Vulkan instance: {code}; is a Vulkan driver installed? (or --backend cpu)"
-                ))
-            })?;
+            let handle = entry
+                .create_instance(&create, None)
+                .map_err(|code| Error::unfit(format!("no Vulkan instance: {code}"), Remedy::InstallDriver))?;
             let debug = if validate {
                 let debug = ext::debug_utils::Instance::new(&entry, &handle);
                 let info = vk::DebugUtilsMessengerCreateInfoEXT::default()

@@ -7,7 +7,7 @@ use ash::vk;
 use super::context::{Context, OrVulkan};
 use super::device::Device;
 use super::pipeline::{Pipeline, descriptor_type};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::stage::{Access, StageDesc};
 
 /// A shader, and the buffers of its bindings in order.
@@ -119,13 +119,13 @@ impl Device {
             let view;
             if access == Access::Texels {
                 if buffer.bytes / 16 > u64::from(self.summary.max_texels) {
-                    return Err(Error::Device(format!(
-                        "{id:?} has {} texels, device {} reads {} at most; try fewer --photons, a smaller --resolution or \
-                         another --device",
+                    let what = format!(
+                        "{id:?} has {} texels, device {} reads {} at most",
                         buffer.bytes / 16,
                         self.summary.name,
                         self.summary.max_texels
-                    )));
+                    );
+                    return Err(Error::unfit(what, Remedy::SmallerRender));
                 }
                 view = [buffer.texels(&self.context)?];
                 write = write.texel_buffer_view(&view);

@@ -11,7 +11,7 @@ use super::descriptors::Descriptors;
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
 use super::submission::Slots;
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::stage::BufferId;
 use crate::text;
 
@@ -91,13 +91,13 @@ impl Device {
     /// No memory, or more bytes than the device can bind.
     pub fn create(&mut self, id: BufferId, bytes: u64) -> Result<()> {
         if bytes > self.summary.max_storage_buffer_bytes {
-            return Err(Error::Device(format!(
-                "{id:?} needs {}, device {} binds {} at most; {}",
+            let what = format!(
+                "{id:?} needs {}, device {} binds {} at most",
                 text::bytes(bytes),
                 self.summary.name,
-                text::bytes(self.summary.max_storage_buffer_bytes),
-                advice(id)
-            )));
+                text::bytes(self.summary.max_storage_buffer_bytes)
+            );
+            return Err(Error::unfit(what, remedy(id)));
         }
         self.remove(id);
         let buffer = Buffer::new(&self.context, &format!("{id:?}"), bytes, MemoryLocation::GpuOnly)?;
@@ -149,12 +149,10 @@ impl Device {
 }
 
 /// What makes a buffer smaller.
-pub(crate) fn advice(id: BufferId) -> &'static str {
+pub(crate) fn remedy(id: BufferId) -> Remedy {
     match id {
-        BufferId::Textures | BufferId::Texels => {
-            "make the scene's textures smaller, or use another --device or --backend cpu"
-        }
-        BufferId::Environment => "make the environment's picture smaller, or use another --device or --backend cpu",
+        BufferId::Textures | BufferId::Texels => Remedy::SmallerTextures,
+        BufferId::Environment => Remedy::SmallerEnvironment,
         BufferId::Bvh
         | BufferId::HavelTriangles
         | BufferId::ShadingTriangles
@@ -165,8 +163,8 @@ pub(crate) fn advice(id: BufferId) -> &'static str {
         | BufferId::NearLights
         | BufferId::LightSources
         | BufferId::MediaOfLights
-        | BufferId::ObjectGrids => "make the scene smaller, or use another --device or --backend cpu",
-        _ => "try fewer --photons or a smaller --resolution",
+        | BufferId::ObjectGrids => Remedy::SmallerScene,
+        _ => Remedy::SmallerRender,
     }
 }
 
@@ -174,12 +172,13 @@ fn check_usable(summary: &DeviceSummary) -> Result<()> {
     if summary.lacks.is_empty() {
         return Ok(());
     }
-    Err(Error::Device(format!(
-        "device {} ({}) lacks {}; pick another with --device (ppm-vk devices lists them) or use --backend cpu",
+    let what = format!(
+        "device {} ({}) lacks {}",
         summary.index,
         summary.name,
         summary.lacks.join(", ")
-    )))
+    );
+    Err(Error::unfit(what, Remedy::AnotherDevice))
 }
 
 pub(super) fn choose(
@@ -191,9 +190,7 @@ pub(super) fn choose(
         .map(|(_, summary)| format!("{}: {}", summary.index, summary.name))
         .collect();
     if names.is_empty() {
-        return Err(Error::Device(
-            "no Vulkan device; install a driver (Debian: mesa-vulkan-drivers) or use --backend cpu".to_owned(),
-        ));
+        return Err(Error::unfit("no Vulkan device", Remedy::InstallDriver));
     }
     let position = match choice {
         Some(choice) => named(&devices, choice)?,
@@ -208,8 +205,8 @@ pub(super) fn choose(
         }),
     };
     let position = position.ok_or_else(|| {
-        Error::Device(format!(
-            "no device matches --device {}; this machine has {}",
+        Error::Config(format!(
+            "no device matches {}; this machine has {}",
             choice.unwrap_or(""),
             names.join(", ")
         ))
@@ -240,10 +237,8 @@ fn named(devices: &[(vk::PhysicalDevice, DeviceSummary)], choice: &str) -> Resul
             .iter()
             .map(|&i| format!("{}: {}", devices[i].1.index, devices[i].1.name))
             .collect();
-        return Err(Error::Device(format!(
-            "--device {choice} may be {}; give more of the name, or the index",
-            names.join(", ")
-        )));
+        let what = format!("device {choice} may be {}", names.join(", "));
+        return Err(Error::unfit(what, Remedy::NameOneDevice));
     }
     Ok(found.first().copied())
 }
@@ -333,7 +328,7 @@ mod tests {
     fn a_device_that_is_not_there_is_told_from_those_that_are() {
         let error = chosen(Some("9")).expect_err("no such device").to_string();
         assert!(
-            error.contains("--device 9") && error.contains("2: Small Card"),
+            error.contains("matches 9") && error.contains("2: Small Card"),
             "{error}"
         );
     }
@@ -346,6 +341,6 @@ mod tests {
             error.contains("Old Card") && error.contains("lacks Vulkan 1.2"),
             "{error}"
         );
-        assert!(error.contains("--backend cpu") && !error.contains('\n'), "{error}");
+        assert!(error.contains("or the CPU") && !error.contains('\n'), "{error}");
     }
 }

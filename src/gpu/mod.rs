@@ -14,7 +14,7 @@ mod statistics;
 mod submission;
 
 pub use context::DeviceSummary;
-pub(crate) use device::advice;
+pub(crate) use device::remedy;
 pub use device::{Device, best_device, devices};
 pub use execute::{Done, Ticket};
 pub use statistics::Compiler;

@@ -7,7 +7,7 @@ use super::context::{Context, DeviceSummary, Instance, OrVulkan};
 use super::device::choose;
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::stage::StageDesc;
 
 /// A device that compiles kernels and runs none.
@@ -27,11 +27,13 @@ impl Compiler {
         let instance = Instance::shared()?;
         let (physical, summary) = choose(instance.devices()?, choice)?;
         if !instance.tells_statistics(physical)? {
-            return Err(Error::Device(format!(
-                "device {} ({}) doesn't tell what it compiles kernels to (VK_KHR_pipeline_executable_properties); pick another with \
-                 --device",
-                summary.index, summary.name
-            )));
+            return Err(Error::unfit(
+                format!(
+                    "device {} ({}) doesn't tell what it compiles kernels to (VK_KHR_pipeline_executable_properties)",
+                    summary.index, summary.name
+                ),
+                Remedy::AnotherVulkanDevice,
+            ));
         }
         let context = Context::new(instance, physical, true)?;
         let properties = khr::pipeline_executable_properties::Device::new(&context.instance.handle, &context.device);

@@ -3,9 +3,9 @@
 use std::collections::{HashMap, HashSet};
 
 use glam::{DQuat, DVec3};
-use gltf::json::animation::{Channel, Property};
-use gltf::json::validation::Checked;
-use gltf::json::{Animation, Root};
+use gltf_json::animation::{Channel, Property};
+use gltf_json::validation::Checked;
+use gltf_json::{Animation, Root};
 
 use super::curve::{Curve, Keyframes};
 use super::diagnostic::{Check, Warnings, damaged, label};

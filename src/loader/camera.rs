@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use glam::Vec2;
-use gltf::json::camera::{Orthographic, Perspective, Type};
-use gltf::json::validation::Checked;
-use gltf::json::{self, Root};
+use gltf_json::Root;
+use gltf_json::camera::{Orthographic, Perspective, Type};
+use gltf_json::validation::Checked;
 
 use super::diagnostic::{Check, Warnings, damaged, label};
 use super::graph::{PlacedNode, node_label};
@@ -50,7 +50,7 @@ pub(crate) fn cameras(
 }
 
 /// What the camera shows, and width over height where the file gives it. Clipping planes play no part.
-fn projection(camera: &json::Camera, normalisation: Normalisation) -> Check<(Projection, Option<f32>)> {
+fn projection(camera: &gltf_json::Camera, normalisation: Normalisation) -> Check<(Projection, Option<f32>)> {
     match camera.type_ {
         Checked::Valid(Type::Orthographic) => match &camera.orthographic {
             Some(orthographic) => of_orthographic(orthographic, normalisation),

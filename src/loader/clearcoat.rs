@@ -1,9 +1,9 @@
 //! KHR_materials_clearcoat, which the `gltf` crate doesn't know.
 
 use crate::loader::extensions::CLEARCOAT;
-use gltf::json::Material;
-use gltf::json::material::NormalTexture;
-use gltf::json::texture::Info;
+use gltf_json::Material;
+use gltf_json::material::NormalTexture;
+use gltf_json::texture::Info;
 use serde::Deserialize;
 
 /// What a material says of its coat.

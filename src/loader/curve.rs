@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 
 use glam::DQuat;
-use gltf::json::animation::{Interpolation, Sampler};
-use gltf::json::validation::Checked;
+use gltf_json::animation::{Interpolation, Sampler};
+use gltf_json::validation::Checked;
 
 use super::diagnostic::{Check, damaged};
 use super::file::accessor::{FLOATS, Formats, Vectors};

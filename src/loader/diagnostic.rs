@@ -3,9 +3,9 @@
 use std::collections::HashSet;
 use std::fmt::Display;
 
-use gltf::json::Mesh;
+use gltf_json::Mesh;
 
-use crate::error::one_line;
+use crate::scene::Remark;
 use crate::text::quote;
 
 /// Result of a step of loading. The message says what is wrong, where and what to do; `Scene::load` adds the path.
@@ -33,21 +33,25 @@ pub(crate) fn damaged(what: impl Display) -> String {
 /// Warnings in the order in which they arose, each text once.
 #[derive(Default)]
 pub(crate) struct Warnings {
-    lines: Vec<String>,
+    lines: Vec<Remark>,
     seen: HashSet<String>,
 }
 
 impl Warnings {
     /// Adds a line unless it is there already, as it is for a mesh that several nodes show.
     pub(crate) fn push(&mut self, text: String) {
-        let line = one_line(text);
-        if self.seen.insert(line.clone()) {
-            self.lines.push(line);
+        self.add(text.into());
+    }
+
+    /// The same of a remark.
+    pub(crate) fn add(&mut self, warning: Remark) {
+        if self.seen.insert(warning.text().to_owned()) {
+            self.lines.push(warning);
         }
     }
 
     /// The lines.
-    pub(crate) fn into_lines(self) -> Vec<String> {
+    pub(crate) fn into_lines(self) -> Vec<Remark> {
         self.lines
     }
 }

@@ -1,11 +1,12 @@
 //! The node hierarchy: which nodes the scene shows, and where in the world they stand.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use gltf::json::{Node, Root};
+use gltf_json::{Node, Root};
 
 use super::animation::{NodePose, Pose};
 use super::diagnostic::{Check, damaged, label};
 use super::scenes;
+use crate::scene::Remark;
 
 /// How far the last row of a node's matrix may be from 0 0 0 1.
 const AFFINE_TOLERANCE: f64 = 1e-5;
@@ -29,7 +30,7 @@ pub(crate) fn place_nodes<'a>(
     root: &'a Root,
     pose: &Pose<'_>,
     scene: Option<&str>,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Remark>,
 ) -> Check<Vec<PlacedNode<'a>>> {
     let parents = check_forest(root)?;
     let scene = scenes::choose(root, &parents, scene, notes)?;

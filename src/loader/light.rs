@@ -3,9 +3,9 @@
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec3};
-use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Type};
-use gltf::json::validation::Checked;
-use gltf::json::{Index, Root};
+use gltf_json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Type};
+use gltf_json::validation::Checked;
+use gltf_json::{Index, Root};
 
 use super::LoadOptions;
 use super::diagnostic::{Check, Warnings, damaged, label};
@@ -170,7 +170,7 @@ fn place(
 fn radius_of(radius: f64) -> Check<f64> {
     if radius > LARGEST_RADIUS {
         return Err(format!(
-            "--light-radius is more than {LARGEST_RADIUS} times as large as the scene; give it in the scene's units"
+            "the radius of points and spots is more than {LARGEST_RADIUS} times as large as the scene; give it in the scene's units"
         ));
     }
     Ok(if radius < SMALLEST_RADIUS { 0.0 } else { radius })

@@ -1,7 +1,9 @@
 //! What the numbers of punctual lights mean, which exporters don't agree on.
 
-use gltf::json::Root;
+use gltf_json::Root;
 
+use crate::config::choices;
+use crate::scene::{LoadChoice, Remark};
 use crate::text::quote;
 
 /// Lumens a watt by which Blender's exporter multiplies lamps in its «Standard» units, and not what emits.
@@ -13,16 +15,18 @@ const BLENDER: &str = "Khronos glTF Blender I/O";
 /// Its first version with such units; older ones write what is «Unitless» now.
 const FIRST_IN_LUMENS: (u32, u32) = (3, 6);
 
-/// Units of the intensities of punctual lights.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-pub enum LightUnits {
-    /// `blender` where the file says that Blender's exporter wrote it, which is said, else `spec`.
-    #[default]
-    Auto,
-    /// Intensity and irradiance on the scale of emitted radiance, as `KHR_lights_punctual` has it.
-    Spec,
-    /// 683 times as much, as Blender's exporter has it in «Standard» units.
-    Blender,
+choices! {
+    /// Units of the intensities of punctual lights.
+    #[derive(Default)]
+    pub enum LightUnits {
+        /// `blender` where the file says that Blender's exporter wrote it, which is said, else `spec`.
+        #[default]
+        Auto => "auto",
+        /// Intensity and irradiance on the scale of emitted radiance, as `KHR_lights_punctual` has it.
+        Spec => "spec",
+        /// 683 times as much, as Blender's exporter has it in «Standard» units.
+        Blender => "blender",
+    }
 }
 
 impl LightUnits {
@@ -36,14 +40,15 @@ impl LightUnits {
     }
 
     /// What is to be said of a file with punctual lights.
-    pub(crate) fn note(self, root: &Root) -> Option<String> {
+    pub(crate) fn note(self, root: &Root) -> Option<Remark> {
         let taken = self == Self::Auto && is_in_lumens(generator(root));
         taken.then(|| {
-            format!(
+            let what = format!(
                 "{} wrote it: its lights are divided by {LUMENS_PER_WATT}, as Blender's «Standard» lighting wants it; where it was \
-                 exported as «Unitless», --light-units spec is right",
+                 exported as «Unitless», the specification's units are right",
                 quote(generator(root))
-            )
+            );
+            Remark::with(LoadChoice::LightUnits, what)
         })
     }
 }

@@ -3,11 +3,10 @@
 use crate::loader::extensions::CLEARCOAT;
 use crate::scene::normal_reflectance;
 use glam::Vec3;
-use gltf::json;
-use gltf::json::extensions::material::Volume;
-use gltf::json::material::{AlphaMode, NormalTexture};
-use gltf::json::texture::Info;
-use gltf::json::validation::Checked;
+use gltf_json::extensions::material::Volume;
+use gltf_json::material::{AlphaMode, NormalTexture};
+use gltf_json::texture::Info;
+use gltf_json::validation::Checked;
 
 use super::clearcoat::Clearcoat;
 use super::diagnostic::{Check, Warnings, damaged, label};
@@ -28,12 +27,12 @@ const STEEPEST: f32 = 1e4;
 ///
 /// Only those that `used` marks (one flag for each, the default's last) give rise to warnings.
 pub(crate) fn materials(
-    root: &json::Root,
+    root: &gltf_json::Root,
     used: &[bool],
     textures: &mut TextureReader<'_>,
     warnings: &mut Warnings,
 ) -> Check<Vec<Material>> {
-    let default = json::Material {
+    let default = gltf_json::Material {
         name: Some("default".into()),
         ..Default::default()
     };
@@ -62,7 +61,7 @@ pub(crate) fn materials(
 }
 
 /// What the material at `index`, which was read as `thin`, is if it isn't taken for a thin wall.
-pub(crate) fn solid(root: &json::Root, index: usize, thin: &Material) -> Check<Material> {
+pub(crate) fn solid(root: &gltf_json::Root, index: usize, thin: &Material) -> Check<Material> {
     let mut reader = Reader {
         json: &root.materials[index],
         solid: true,
@@ -76,7 +75,7 @@ pub(crate) fn solid(root: &json::Root, index: usize, thin: &Material) -> Check<M
 
 /// One material with the warnings about it.
 struct Reader<'a> {
-    json: &'a json::Material,
+    json: &'a gltf_json::Material,
     /// Whether it is solid where it has no volume.
     solid: bool,
     warnings: Vec<String>,
@@ -313,7 +312,7 @@ impl Reader<'_> {
 
     fn extension<'s, T>(
         &'s self,
-        select: impl FnOnce(&'s json::extensions::material::Material) -> Option<&'s T>,
+        select: impl FnOnce(&'s gltf_json::extensions::material::Material) -> Option<&'s T>,
     ) -> Option<&'s T> {
         self.json.extensions.as_ref().and_then(select)
     }

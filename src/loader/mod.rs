@@ -26,7 +26,7 @@ use glam::Vec3;
 
 use self::animation::Pose;
 use self::diagnostic::{Check, Warnings};
-use self::file::budget::Budget;
+use self::file::budget::{Budget, FirstRefusal};
 use self::file::buffer::referred_files;
 use self::file::document::Document;
 use self::graph::place_nodes;
@@ -34,7 +34,7 @@ use self::light::punctual_lights;
 use self::mesh::{assembly, solid};
 use self::texture::TextureReader;
 use crate::error::{Error, Result};
-use crate::scene::{Environment, Scene, Surface, framed_on};
+use crate::scene::{Environment, LoadChoice, Remark, Scene, Surface, framed_on};
 use crate::text::{quote, shorten};
 
 /// What a scene is loaded with.
@@ -70,7 +70,7 @@ impl Scene {
     /// # Errors
     ///
     /// [`Error::Scene`], one line, if the file or one of its buffers can't be read or is damaged, if it requires an
-    /// extension that isn't supported, or if it shows no triangle.
+    /// extension that isn't supported, or if it shows no triangle; [`Error::Memory`] if it needs too much memory.
     pub fn load(path: &Path) -> Result<Self> {
         Self::load_with(path, LoadOptions::default())
     }
@@ -81,14 +81,27 @@ impl Scene {
     ///
     /// As [`Scene::load`].
     pub fn load_with(path: &Path, options: LoadOptions) -> Result<Self> {
-        load(path, options).map_err(|what| Error::scene(path, what))
+        let budget = Budget::new(options.memory_limit.unwrap_or(MEMORY_LIMIT));
+        let refused = budget.refused();
+        load(path, options, budget).map_err(|what| failure(path, what, &refused))
     }
 }
 
-fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
+/// What failed: of all that can, memory is told apart.
+fn failure(path: &Path, what: String, refused: &FirstRefusal) -> Error {
+    match &*refused.borrow() {
+        Some(refusal) if what.contains(&refusal.what) => Error::Memory {
+            path: path.to_owned(),
+            what,
+            needed: refusal.needed,
+        },
+        _ => Error::scene(path, what),
+    }
+}
+
+fn load(path: &Path, options: LoadOptions, budget: Budget) -> Check<Scene> {
     let mut warnings = Warnings::default();
     let mut notes = Vec::new();
-    let budget = Budget::new(options.memory_limit.unwrap_or(MEMORY_LIMIT));
     if let Some(environment) = &options.environment {
         budget.take(environment.bytes(), "the environment")?;
     }
@@ -171,9 +184,10 @@ fn load(path: &Path, options: LoadOptions) -> Check<Scene> {
         scene.cameras.push(framed_on(scene.bounds()));
     }
     if scene.environment.is_none() && scene.lights.is_empty() && !scene.has_emissive_triangles() {
-        warnings.push(
-            "it has no light; it is rendered in an environment of radiance 1 (--environment sets another one)".into(),
-        );
+        warnings.add(Remark::with(
+            LoadChoice::Environment,
+            "it has no light; it is rendered in an environment of radiance 1",
+        ));
         scene.environment = Some(Environment::constant(Vec3::ONE));
     }
     for warning in scene.environment.iter().flat_map(Environment::warnings) {
@@ -196,8 +210,9 @@ fn warn_of_ignored(document: &Document, options: &LoadOptions, warnings: &mut Wa
         }
     }
     if !root.animations.is_empty() && options.frame_time.is_none() {
-        warnings.push(
-            "its animations need a time (--frame-time SECONDS); everything is rendered as it stands at rest".into(),
-        );
+        warnings.add(Remark::with(
+            LoadChoice::FrameTime,
+            "its animations need a time; everything is rendered as it stands at rest",
+        ));
     }
 }

@@ -1,8 +1,9 @@
 //! Which of a file's scenes is rendered.
 
-use gltf::json::{Root, Scene};
+use gltf_json::{Root, Scene};
 
 use super::diagnostic::{Check, damaged, label};
+use crate::scene::{LoadChoice, Remark};
 use crate::text::{list, quote};
 
 /// Index of the scene: the one with the name or, if none has it, the number that is wanted, or else the default one. Where that
@@ -12,7 +13,7 @@ pub(crate) fn choose(
     root: &Root,
     parents: &[Option<usize>],
     wanted: Option<&str>,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Remark>,
 ) -> Check<Option<usize>> {
     let scenes = &root.scenes;
     let names = || {
@@ -23,7 +24,7 @@ pub(crate) fn choose(
         let by_name = scenes.iter().position(|scene| scene.name.as_deref() == Some(wanted));
         let by_number = || wanted.parse().ok().filter(|&index| index < scenes.len());
         return match by_name.or_else(by_number) {
-            None if scenes.is_empty() => Err("it has no scenes to choose from; leave out --scene-name".into()),
+            None if scenes.is_empty() => Err("it has no scenes to choose from; ask for none".into()),
             None => Err(format!(
                 "no scene {}: the file has, by number and name, {}",
                 quote(wanted),
@@ -58,10 +59,11 @@ pub(crate) fn choose(
             Some(_) => ", since the default one shows no mesh,",
             None => ", the first that shows a mesh,",
         };
-        notes.push(format!(
-            "{label}{why} is rendered (--scene-name chooses another one); the file has, by number and name, {}",
+        let what = format!(
+            "{label}{why} is rendered; the file has, by number and name, {}",
             names()
-        ));
+        );
+        notes.push(Remark::with(LoadChoice::Scene, what));
     }
     Ok((!scenes.is_empty()).then_some(chosen))
 }

@@ -5,10 +5,9 @@ use crate::scene::Textures;
 use std::collections::HashMap;
 use std::path::Path;
 
-use gltf::json;
-use gltf::json::extensions::texture::TextureTransform;
-use gltf::json::texture::{MagFilter, WrappingMode};
-use gltf::json::validation::Checked;
+use gltf_json::extensions::texture::TextureTransform;
+use gltf_json::texture::{MagFilter, WrappingMode};
+use gltf_json::validation::Checked;
 
 use super::diagnostic::{Check, damaged, label};
 use super::file::document::Document;
@@ -121,7 +120,12 @@ impl<'a> TextureReader<'a> {
 
 impl TextureReader<'_> {
     /// First texel and size of the image of a texture: the first one that can be read of those that it names.
-    fn image(&mut self, index: usize, texture: &json::Texture, warnings: &mut Vec<String>) -> Check<Option<[u32; 2]>> {
+    fn image(
+        &mut self,
+        index: usize,
+        texture: &gltf_json::Texture,
+        warnings: &mut Vec<String>,
+    ) -> Check<Option<[u32; 2]>> {
         let images = &self.document.root.images;
         let named = sources(texture);
         if named.is_empty() {
@@ -192,7 +196,7 @@ fn first_texel(before: u64, count: u64) -> Check<u32> {
 
 /// The images that a texture names, each to stand for those before it: what extensions name is better than what is there for
 /// programs that don't know them.
-fn sources(texture: &json::Texture) -> Vec<usize> {
+fn sources(texture: &gltf_json::Texture) -> Vec<usize> {
     let extensions = texture.extensions.as_ref();
     let of_extension = |name| {
         let source = extensions?.others.get(name)?.get("source")?.as_u64()?;

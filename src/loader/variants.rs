@@ -1,7 +1,7 @@
 //! `KHR_materials_variants`: other materials for the same primitives, chosen by name.
 
 use crate::loader::extensions::VARIANTS;
-use gltf::json::{Index, Root};
+use gltf_json::{Index, Root};
 use serde::Deserialize;
 
 use super::diagnostic::{Check, damaged};
@@ -45,7 +45,7 @@ pub(crate) fn names(root: &Root) -> Check<Vec<String>> {
 pub(crate) fn choose(root: &mut Root, names: &[String], wanted: &str) -> Check<()> {
     let Some(chosen) = names.iter().position(|name| name == wanted) else {
         let there_are = match names {
-            [] => "the file has none; leave out --variant".to_owned(),
+            [] => "the file has none; ask for none".to_owned(),
             names => {
                 let names: Vec<String> = names.iter().map(|name| quote(name)).collect();
                 format!("the file has {}", list(&names))

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::memory::scene_buffers;
 use super::stages::Stages;
 use crate::config::{RenderConfig, Totals};
-use crate::error::{Error, Result};
-use crate::gpu::{DeviceSummary, advice};
+use crate::error::{Error, Remedy, Result};
+use crate::gpu::{DeviceSummary, remedy};
 use crate::packing::PackedScene;
 use crate::record::{Command, Recording};
 use crate::sizes::{Limits, Sizes};
@@ -43,15 +43,10 @@ pub(super) fn check_fits(
             };
             too_large(scene, &config, device, limits).is_none()
         });
-    let advice = match smaller {
-        Some([width, height]) => format!("try --resolution {width}x{height}, or another --device or --backend cpu"),
-        None => advice(id).to_owned(),
-    };
-    Err(Error::Device(format!(
-        "{id:?} needs {}, device {} {most}; {advice}",
-        text::bytes(bytes),
-        device.name
-    )))
+    Err(Error::unfit(
+        format!("{id:?} needs {}, device {} {most}", text::bytes(bytes), device.name),
+        smaller.map_or_else(|| remedy(id), Remedy::Resolution),
+    ))
 }
 
 fn too_large(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary, limits: Limits) -> Option<TooLarge> {
@@ -135,11 +130,14 @@ mod tests {
     }
 
     /// The resolution that an error advises.
-    fn advised(error: &str) -> [u32; 2] {
-        let after = error.split("--resolution ").nth(1).expect("a resolution");
-        let size = after.split(',').next().expect("a resolution");
-        let sides: Vec<u32> = size.split('x').map(|side| side.parse().expect("a side")).collect();
-        [sides[0], sides[1]]
+    fn advised(error: &Error) -> [u32; 2] {
+        match error {
+            Error::Unfit {
+                remedy: Remedy::Resolution(resolution),
+                ..
+            } => *resolution,
+            other => panic!("no resolution is advised: {other}"),
+        }
     }
 
     #[test]
@@ -147,13 +145,9 @@ mod tests {
         // As SwiftShader has it.
         let swift = device(1 << 16, 1 << 30);
         check("cornell", [64, 64], &swift).expect("64x64 fits");
-        let error = check("cornell", [640, 480], &swift)
-            .expect_err("640x480 doesn't")
-            .to_string();
-        assert!(
-            error.contains("65536 texels") && error.contains("Small Card"),
-            "{error}"
-        );
+        let error = check("cornell", [640, 480], &swift).expect_err("640x480 doesn't");
+        let text = error.to_string();
+        assert!(text.contains("65536 texels") && text.contains("Small Card"), "{text}");
         let fits = advised(&error);
         assert!(fits[0] > 100, "{error}");
         check("cornell", fits, &swift).unwrap_or_else(|error| panic!("what was advised: {error}"));
@@ -162,20 +156,23 @@ mod tests {
     #[test]
     fn a_buffer_larger_than_what_can_be_allocated_is_told() {
         let small = device(1 << 27, 1 << 20);
-        let error = check("cornell", [640, 480], &small)
-            .expect_err("1 MiB is too little")
-            .to_string();
-        assert!(error.contains("allocates 1.0 MiB at once"), "{error}");
+        let error = check("cornell", [640, 480], &small).expect_err("1 MiB is too little");
+        assert!(error.to_string().contains("allocates 1.0 MiB at once"), "{error}");
         check("cornell", advised(&error), &small).unwrap_or_else(|error| panic!("what was advised: {error}"));
     }
 
     #[test]
     fn no_resolution_is_advised_where_the_scene_is_too_large() {
         let tiny = device(16, 1 << 30);
-        let error = check("cornell-spheres", [64, 64], &tiny)
-            .expect_err("16 texels")
-            .to_string();
-        assert!(!error.contains("--resolution"), "{error}");
-        assert!(error.contains("--device") && error.contains("--backend cpu"), "{error}");
+        let error = check("cornell-spheres", [64, 64], &tiny).expect_err("16 texels");
+        let Error::Unfit { remedy, .. } = error else {
+            panic!("{error}")
+        };
+        let of_scenes = [
+            Remedy::SmallerScene,
+            Remedy::SmallerTextures,
+            Remedy::SmallerEnvironment,
+        ];
+        assert!(of_scenes.contains(&remedy), "{remedy}");
     }
 }

@@ -7,7 +7,7 @@ use super::{Renderer, Stages};
 use crate::backend::Counters;
 use crate::config::Totals;
 use crate::emission::{counted_paths, is_learned_from};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::gpu::{Done, Ticket};
 use crate::layout::{GATHERS_TOO_LONG, LANES_TOO_LONG, PHOTONS_DID_NOT_FIT, StatusCounters};
 use crate::random::CameraTurn;
@@ -102,10 +102,13 @@ impl Renderer {
             }
             self.make_room(&status)?;
         }
-        Err(Error::Device(format!(
-            "device {} cuts loops however small their parts; use another --device or --backend cpu",
-            self.device.summary().name
-        )))
+        Err(Error::unfit(
+            format!(
+                "device {} cuts loops however small their parts",
+                self.device.summary().name
+            ),
+            Remedy::AnotherDevice,
+        ))
     }
 
     /// After an iteration that has to be done again: sizes that it needs, and what it gathered forgotten.

@@ -16,7 +16,7 @@ pub use stages::Stages;
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Accel, RenderConfig, Totals};
 use crate::emission::Aim;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gather::{METHODS, default_method, grid_sizes};
 use crate::gpu::Device;
 use crate::layout::{Settings, StatusCounters};
@@ -84,10 +84,8 @@ impl Renderer {
         config.check()?;
         let method = &METHODS[config.gather.unwrap_or_else(default_method)];
         if method.stages().is_none() {
-            return Err(Error::Config(format!(
-                "--gather {}: runs on the CPU; add --backend cpu",
-                method.name
-            )));
+            let what = format!("{}: runs on the CPU alone", method.name);
+            return Err(Error::setting(Setting::Gather, what));
         }
         let within = |loop_limit, device: &Device| Limits {
             storage_buffer_bytes: buffer_bytes,
@@ -98,11 +96,11 @@ impl Renderer {
         let limits = within(loop_limit, &device);
         let triangles = scene.seen_triangles();
         if config.accel == Accel::Brute && triangles > u64::from(limits.loop_limit) {
-            return Err(Error::Device(format!(
-                "--accel brute: device {} ends loops early, and the scene has {triangles} triangles; use --accel bvh or \
-                 another --device",
+            let what = format!(
+                "brute: device {} ends loops early, and the scene has {triangles} triangles; use bvh or another device",
                 device.summary().name
-            )));
+            );
+            return Err(Error::setting(Setting::Accel, what));
         }
         let sizes = Sizes::new(&config, limits);
         for (id, bytes) in scene_buffers(scene, config.triangle_test) {

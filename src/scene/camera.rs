@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::Scene;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::text::{list, quote};
 
 /// Vertical angle of view of the camera that is framed on the bounds, in radians.
@@ -120,7 +120,7 @@ impl Scene {
     /// distance the centre of the scene's bounds is in focus.
     ///
     /// # Errors
-    /// [`Error::Config`], if that lies behind the camera.
+    /// [`Error::Setting`], if that lies behind the camera, or if the lens is too wide.
     pub fn lens(&self, camera: &Camera, radius: f64, focus: Option<f64>) -> Result<Lens> {
         let scale = self.normalisation.scale;
         let (lower, upper) = self.bounds();
@@ -129,17 +129,18 @@ impl Scene {
             ((focus * scale) as f32).clamp(NEAREST_FOCUS, FARTHEST_FOCUS)
         });
         if radius * scale > LARGEST_LENS {
-            return Err(Error::Config(format!(
-                "--aperture {radius:e}: all would be blurred to nothing; a lens has a radius of {:.3} scene units at the most here",
+            let what = format!(
+                "{radius:e}: all would be blurred to nothing; a lens has a radius of {:.3} scene units at the most here",
                 LARGEST_LENS / scale
-            )));
+            );
+            return Err(Error::setting(Setting::Aperture, what));
         }
         if focus > 0.0 && radius * scale > WIDEST_LENS * f64::from(focus) {
-            return Err(Error::Config(format!(
-                "--aperture {radius:e} with things in focus at {:e}: the lens is too wide to see anything by; make it smaller, or move \
-                 the focus away by --focus",
+            let what = format!(
+                "{:e}: for that a lens of radius {radius:e} is too wide to see anything by; make it smaller, or move the focus away",
                 f64::from(focus) / scale
-            )));
+            );
+            return Err(Error::setting(Setting::Focus, what));
         }
         if focus > 0.0 && focus.is_finite() {
             Ok(Lens {
@@ -147,8 +148,9 @@ impl Scene {
                 focus,
             })
         } else {
-            Err(Error::Config(
-                "--aperture: the centre of the scene lies behind the camera; say what is in focus by --focus".into(),
+            Err(Error::setting(
+                Setting::Focus,
+                "on the scene's centre: that lies behind the camera; say what is in focus",
             ))
         }
     }

@@ -205,16 +205,15 @@ fn check_size(path: &Path, pixels: u64, memory_limit: u64) -> Result<()> {
     if needed <= memory_limit {
         return Ok(());
     }
-    Err(Error::file(
-        path,
-        format!(
-            "has {pixels} pixels, for which {} of memory are needed, more than the {} that a scene may take; scale it down, or allow \
-             more by --memory-limit {}",
+    Err(Error::Memory {
+        path: path.to_owned(),
+        what: format!(
+            "has {pixels} pixels, for which {} of memory are needed, more than the {} that a scene may take",
             bytes(needed),
-            bytes(memory_limit),
-            needed.div_ceil(1 << 30)
+            bytes(memory_limit)
         ),
-    ))
+        needed,
+    })
 }
 
 /// The picture with fewer pixels, each the mean of what it stands for; values that are no radiance are 0.

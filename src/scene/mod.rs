@@ -8,6 +8,7 @@ mod environment;
 mod light;
 mod material;
 mod placement;
+mod remark;
 mod texture;
 
 pub use camera::{Camera, Lens, Projection};
@@ -17,6 +18,7 @@ pub use light::{Emission, PunctualLight};
 pub(crate) use material::normal_reflectance;
 pub use material::{Alpha, Coat, Dielectric, Gloss, Material, MaterialTextures, Surface};
 pub use placement::Placement;
+pub use remark::{LoadChoice, Remark};
 pub use texture::Textures;
 
 use std::path::PathBuf;
@@ -113,9 +115,9 @@ pub struct Scene {
     /// Names of the file's material variants.
     pub variants: Vec<String>,
     /// What the file asks for and the renderer doesn't do, one line each.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Remark>,
     /// What was decided where a file leaves a choice, one line each.
-    pub notes: Vec<String>,
+    pub notes: Vec<Remark>,
 }
 
 impl Scene {

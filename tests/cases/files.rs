@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ppm_vk::film::{Image, read_exr};
-use ppm_vk::metrics::{Defects, defects};
+use ppm_vk::internals::film::{Image, read_exr};
+use ppm_vk::internals::metrics::{Defects, defects};
 use tempfile::TempDir;
 
 use super::program::{ppm_vk, stderr};

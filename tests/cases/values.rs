@@ -3,7 +3,7 @@
 //! Tolerances are five standard deviations, measured over other seeds, beside what the radius may blur: a false alarm is rarer than 1 in
 //! 10⁶ for each value.
 
-use ppm_vk::film::read_exr;
+use ppm_vk::internals::film::read_exr;
 
 use super::files::{Seen, assert_refused, folder, name, render, scenes};
 

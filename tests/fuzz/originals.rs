@@ -4,9 +4,9 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
-use ppm_vk::loader::LoadOptions;
-use ppm_vk::scene::Environment;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::loader::LoadOptions;
+use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ppm_vk::error::Result;
-use ppm_vk::packing::PackedScene;
-use ppm_vk::scene::Environment;
-use ppm_vk::scene::Projection;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::error::Result;
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::Projection;
+use ppm_vk::internals::scene::Scene;
 
 /// The longest that a small file may take, whatever is wrong with it, on a machine that does other things as well.
 const MOST_TIME: Duration = Duration::from_secs(30);

@@ -4,17 +4,17 @@ use std::path::Path;
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3};
-use ppm_vk::backend::Backend;
-use ppm_vk::config::RenderConfig;
-use ppm_vk::cpu::{self, SeenByKernels};
-use ppm_vk::film::Image;
-use ppm_vk::gpu::Device;
-use ppm_vk::layout::{CAUSTIC, Gloss, NEAREST, NO_OBJECT, Photon, Settings, TextureLookup, VisiblePoint};
-use ppm_vk::packing::PackedScene;
-use ppm_vk::pipeline::Renderer;
-use ppm_vk::random::{PathKind, Random};
-use ppm_vk::scene::{Camera, Emission, Environment, PunctualLight, Scene};
-use ppm_vk::stage::BufferId;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::cpu::{self, SeenByKernels};
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::layout::{CAUSTIC, Gloss, NEAREST, NO_OBJECT, Photon, Settings, TextureLookup, VisiblePoint};
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::random::{PathKind, Random};
+use ppm_vk::internals::scene::{Camera, Emission, Environment, PunctualLight, Scene};
+use ppm_vk::internals::stage::BufferId;
 
 /// What the names of scenes end in that have a light of every kind more than their file.
 const LIT: &str = ", lit";

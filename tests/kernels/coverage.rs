@@ -1,12 +1,12 @@
 //! The stage `coverage`.
 
-use ppm_vk::config::RenderConfig;
-use ppm_vk::cpu;
-use ppm_vk::layout::{COVERAGE_WHOLE, Coverage, Statistics, VisiblePoint};
-use ppm_vk::random::Random;
-use ppm_vk::record::Recording;
-use ppm_vk::shaders;
-use ppm_vk::stage::{BufferId, StageDesc};
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::layout::{COVERAGE_WHOLE, Coverage, Statistics, VisiblePoint};
+use ppm_vk::internals::random::Random;
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::stage::{BufferId, StageDesc};
 
 use super::agreement::Agreement;
 use super::bench::{Bench, object, reach_of, small, visible_point, xyz};
@@ -114,7 +114,7 @@ fn discs_that_reach_past_a_wall_are_covered_by_their_part_before_it() {
     let mut bench = Bench::new("furnace-closed", config);
     // The floor of the room: its lowest triangles, seen from above.
     let (scene, radius) = (&bench.scene, 0.2);
-    let corners = |t: &ppm_vk::layout::ShadingTriangle| [t.p0, t.p1, t.p2];
+    let corners = |t: &ppm_vk::internals::layout::ShadingTriangle| [t.p0, t.p1, t.p2];
     let low = scene
         .shading_triangles
         .iter()

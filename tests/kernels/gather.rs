@@ -1,16 +1,16 @@
 //! The gather methods: every one finds the same photons, N and M exactly, as testing each photon on the CPU.
 
 use glam::DVec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::config::RenderConfig;
-use ppm_vk::cpu;
-use ppm_vk::gather::{self, METHODS};
-use ppm_vk::layout::{Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
-use ppm_vk::packing::PackedScene;
-use ppm_vk::record::Recording;
-use ppm_vk::shaders;
-use ppm_vk::sizes::Probe;
-use ppm_vk::stage::{BufferId, StageDesc};
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::gather::{self, METHODS};
+use ppm_vk::internals::layout::{Gathered, ObjectGrid, Photon, Statistics, VisiblePoint};
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::sizes::Probe;
+use ppm_vk::internals::stage::{BufferId, StageDesc};
 
 use super::agreement::relative_difference;
 use super::bench::{Bench, Seen, photon, random_numbers, small, visible_point, xyz};

@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Accel, EmissionChoice, RenderConfig, TriangleTest};
-use ppm_vk::cpu;
-use ppm_vk::film::Image;
-use ppm_vk::gpu::Device;
-use ppm_vk::layout::{DIELECTRIC, MIRRORED, Settings, ShadingTriangle, TOUCHED};
-use ppm_vk::metrics::compare;
-use ppm_vk::packing::PackedScene;
-use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::Placement;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Accel, EmissionChoice, RenderConfig, TriangleTest};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::layout::{DIELECTRIC, MIRRORED, Settings, ShadingTriangle, TOUCHED};
+use ppm_vk::internals::metrics::compare;
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::scene::Placement;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 
 use super::agreement::Agreement;

@@ -2,16 +2,16 @@
 //! together after 65,535 iterations, without a word; the gathers have a test of that too.
 
 use glam::DVec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Accel, Direct, EmissionChoice, RenderConfig};
-use ppm_vk::cpu;
-use ppm_vk::gpu::Device;
-use ppm_vk::layout::{DirectSum, Statistics, VisiblePoint};
-use ppm_vk::pipeline::Renderer;
-use ppm_vk::random::CameraTurn;
-use ppm_vk::record::Recording;
-use ppm_vk::shaders;
-use ppm_vk::stage::{BufferId, StageDesc};
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Accel, Direct, EmissionChoice, RenderConfig};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::layout::{DirectSum, Statistics, VisiblePoint};
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::random::CameraTurn;
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::stage::{BufferId, StageDesc};
 
 use super::agreement::relative_difference;
 use super::bench::{Bench, small, xyz};

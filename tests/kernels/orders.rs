@@ -4,11 +4,11 @@
 use std::collections::HashMap;
 
 use glam::DVec3;
-use ppm_vk::config::RenderConfig;
-use ppm_vk::gather;
-use ppm_vk::layout::{GROUP, NO_SLOT, VisiblePoint};
-use ppm_vk::sizes::Probe;
-use ppm_vk::stage::BufferId;
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::gather;
+use ppm_vk::internals::layout::{GROUP, NO_SLOT, VisiblePoint};
+use ppm_vk::internals::sizes::Probe;
+use ppm_vk::internals::stage::BufferId;
 
 use super::bench::{Bench, object, small, xyz};
 

@@ -1,12 +1,12 @@
 //! The stages `emission`, `photons` and `compact`.
 
 use glam::{DVec3, dvec2};
-use ppm_vk::config::{Accel, Direct, EmissionChoice, RenderConfig, Sampler};
-use ppm_vk::cpu;
-use ppm_vk::layout::{PathStart, Photon};
-use ppm_vk::packing::PackedScene;
-use ppm_vk::random::Random;
-use ppm_vk::stage::BufferId;
+use ppm_vk::internals::config::{Accel, Direct, EmissionChoice, RenderConfig, Sampler};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::layout::{PathStart, Photon};
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::random::Random;
+use ppm_vk::internals::stage::BufferId;
 
 use super::agreement::Agreement;
 use super::bench::{Bench, object, small, xyz};

@@ -1,8 +1,8 @@
 //! Pictures by kernels and by the plain renderer: two programs that share the scene's layout and the random numbers, and nothing
 //! else of how light is followed.
 
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, Estimator, RenderConfig, SEQUENCES};
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, Estimator, RenderConfig, SEQUENCES};
 
 use super::bench::{Bench, small};
 

@@ -1,12 +1,12 @@
 //! Prefix sums and sorting: exact.
 
-use ppm_vk::gather;
-use ppm_vk::gpu::Device;
-use ppm_vk::layout::{SCAN_BLOCK, SORT_TILE};
-use ppm_vk::random::pcg4d;
-use ppm_vk::record::Recording;
-use ppm_vk::sizes::SORT_DIGIT_BITS;
-use ppm_vk::stage::BufferId;
+use ppm_vk::internals::gather;
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::layout::{SCAN_BLOCK, SORT_TILE};
+use ppm_vk::internals::random::pcg4d;
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::sizes::SORT_DIGIT_BITS;
+use ppm_vk::internals::stage::BufferId;
 
 fn device() -> Device {
     Device::open(None).expect("a Vulkan device")

@@ -6,17 +6,17 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, Vec3};
-use ppm_vk::config::{RenderConfig, Sampler};
-use ppm_vk::cpu;
-use ppm_vk::layout::{
+use ppm_vk::internals::config::{RenderConfig, Sampler};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::layout::{
     CAMERA_PATH, COVERAGE_SAMPLE, DIELECTRIC, GLOSSY_SURFACE, LIGHT_SAMPLE, Material, NO_TEXTURE, PHOTON_PATH,
     SMOOTH_ALPHA, SPECULAR_CHANGED,
 };
-use ppm_vk::packing::SceneFeatures;
-use ppm_vk::random::{CameraTurn, PathKind, Random};
-use ppm_vk::record::Recording;
-use ppm_vk::shaders;
-use ppm_vk::stage::{BufferId, Shader, StageDesc};
+use ppm_vk::internals::packing::SceneFeatures;
+use ppm_vk::internals::random::{CameraTurn, PathKind, Random};
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::stage::{BufferId, Shader, StageDesc};
 
 use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, random_numbers, small, xyz};

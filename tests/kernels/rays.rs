@@ -1,19 +1,19 @@
 //! Rays against triangles on the device: where rounding decides, nothing may pass between two triangles.
 
 use glam::Vec3;
-use ppm_vk::config::{Accel, RenderConfig, TriangleTest};
-use ppm_vk::gpu::Device;
-use ppm_vk::packing::PackedScene;
-use ppm_vk::packing::SceneFeatures;
-use ppm_vk::pipeline::Renderer;
-use ppm_vk::record::Recording;
-use ppm_vk::scene::Object;
-use ppm_vk::scene::Placement;
-use ppm_vk::scene::SHARED;
-use ppm_vk::scene::Scene;
-use ppm_vk::scene::Triangle;
-use ppm_vk::shaders;
-use ppm_vk::stage::{BufferId, StageDesc};
+use ppm_vk::internals::config::{Accel, RenderConfig, TriangleTest};
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::packing::SceneFeatures;
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::scene::Object;
+use ppm_vk::internals::scene::Placement;
+use ppm_vk::internals::scene::SHARED;
+use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::Triangle;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::stage::{BufferId, StageDesc};
 
 use super::bench::{random_numbers, scene};
 

@@ -4,17 +4,17 @@ use std::f64::consts::PI;
 
 use bytemuck::Zeroable;
 use glam::DVec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{EmissionChoice, Estimator, RenderConfig, Totals, iterations_of, pixel_of};
-use ppm_vk::cpu;
-use ppm_vk::gather::METHODS;
-use ppm_vk::layout::{
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{EmissionChoice, Estimator, RenderConfig, Totals, iterations_of, pixel_of};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::gather::METHODS;
+use ppm_vk::internals::layout::{
     CELLS_TO_RADIUS, Coverage, DirectSum, Gathered, GridShape, MOST_CELLS, NO_OBJECT, Photon, SHELLS, SMALLEST_CELL,
     Settings, ShellRadii, Statistics, VisiblePoint,
 };
-use ppm_vk::record::Recording;
-use ppm_vk::shaders;
-use ppm_vk::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
 
 use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, Seen, object, photon, random_numbers, small, visible_point, xyz};

@@ -3,10 +3,10 @@
 //! Tolerances: the kernels compute in f32, whose rounding (6e-8 of the coordinates, which lie within ±1) the ray's length and
 //! slope multiply a few times.
 
-use ppm_vk::config::RenderConfig;
-use ppm_vk::cpu::{self, Receivers};
-use ppm_vk::random::CameraTurn;
-use ppm_vk::stage::BufferId;
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::cpu::{self, Receivers};
+use ppm_vk::internals::random::CameraTurn;
+use ppm_vk::internals::stage::BufferId;
 
 use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, object, small, xyz};
@@ -39,7 +39,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
     };
     let (mut places, mut scattered) = (Agreement::default(), Agreement::default());
     for (slot, found) in seen.points.iter().enumerate() {
-        let Some([x, y]) = ppm_vk::config::pixel_of(settings.resolution, slot as u32) else {
+        let Some([x, y]) = ppm_vk::internals::config::pixel_of(settings.resolution, slot as u32) else {
             continue;
         };
         let Some(expected) = paths[y as usize * width + x as usize].points.first() else {

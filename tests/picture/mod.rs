@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use ppm_vk::backend::Backend;
-use ppm_vk::config::RenderConfig;
-use ppm_vk::film::{Image, read_exr};
-use ppm_vk::gpu::Device;
-use ppm_vk::metrics::{Defects, defects};
-use ppm_vk::packing::PackedScene;
-use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::film::{Image, read_exr};
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::metrics::{Defects, defects};
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::scene::Scene;
 
 pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

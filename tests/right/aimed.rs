@@ -1,7 +1,7 @@
 //! Aimed photon paths bring the light that those by power bring, only sooner.
 
-use ppm_vk::config::{EmissionChoice, RenderConfig};
-use ppm_vk::metrics;
+use ppm_vk::internals::config::{EmissionChoice, RenderConfig};
+use ppm_vk::internals::metrics;
 
 use crate::measure::measure;
 use crate::picture::{Subject, small};

@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3, dvec3};
-use ppm_vk::backend::Backend;
-use ppm_vk::config::RenderConfig;
-use ppm_vk::cpu;
-use ppm_vk::film::Image;
-use ppm_vk::scene::Environment;
-use ppm_vk::scene::Projection;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::Projection;
 
 use crate::document::{Document, light, matte, mirror, one_sided};
 use crate::measure::{Region, measure};

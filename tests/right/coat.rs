@@ -1,8 +1,8 @@
 //! Clear coats, and glass that reflects another part than its index says.
 
 use glam::{DVec3, dvec3};
-use ppm_vk::config::{Direct, RenderConfig};
-use ppm_vk::cpu::Reflector;
+use ppm_vk::internals::config::{Direct, RenderConfig};
+use ppm_vk::internals::cpu::Reflector;
 use serde_json::{Value, json};
 
 use crate::document::{Document, Filter, emitting, glass, light, matte, metallic_roughness, mirror, png, with_texture};

@@ -5,10 +5,10 @@
 //! bias is in proportion to R² where irradiance is smooth; squared, it falls as n^(−2(1−α)). At an edge it is of the
 //! size of the step within R whatever R is: the mean of its square falls as R, as n^(−(1−α)/2).
 
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, RenderConfig, Sampler};
-use ppm_vk::film::Image;
-use ppm_vk::metrics::REL_MSE_FLOOR;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, RenderConfig, Sampler};
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::metrics::REL_MSE_FLOOR;
 
 use crate::picture::{Subject, reference, small};
 use crate::references::{dim_pixels, error_of_reference};

@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, dvec3};
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, EmissionChoice, RenderConfig, Sampler};
-use ppm_vk::cpu;
-use ppm_vk::layout::{CAUSTIC, Photon};
-use ppm_vk::pipeline::Renderer;
-use ppm_vk::stage::BufferId;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, EmissionChoice, RenderConfig, Sampler};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::layout::{CAUSTIC, Photon};
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::stage::BufferId;
 
 use crate::document::{Document, clear, light, matte, mirror};
 use crate::furnace::{ALBEDO, MAX_DEPTH, closed_room};

@@ -1,14 +1,14 @@
 //! What renders say of their own error, against references.
 
 use glam::{Vec3, dvec3};
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{EmissionChoice, Estimator, RenderConfig};
-use ppm_vk::estimate::{ErrorEstimate, RelativeError, of_one_photon};
-use ppm_vk::film::Image;
-use ppm_vk::metrics::{compare, relative_errors};
-use ppm_vk::scene::Emission;
-use ppm_vk::scene::Environment;
-use ppm_vk::scene::PunctualLight;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{EmissionChoice, Estimator, RenderConfig};
+use ppm_vk::internals::estimate::{ErrorEstimate, RelativeError, of_one_photon};
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::metrics::{compare, relative_errors};
+use ppm_vk::internals::scene::Emission;
+use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::PunctualLight;
 
 use crate::document::{Document, clear, matte};
 use crate::mesh::Mesh;

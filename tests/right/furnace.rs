@@ -1,9 +1,9 @@
 //! Uniform radiance, which nothing that doesn't absorb can change.
 
 use glam::{DVec3, Vec3, dvec3};
-use ppm_vk::config::{Direct, RenderConfig};
-use ppm_vk::metrics::mean;
-use ppm_vk::scene::Environment;
+use ppm_vk::internals::config::{Direct, RenderConfig};
+use ppm_vk::internals::metrics::mean;
+use ppm_vk::internals::scene::Environment;
 
 use crate::document::{Document, clear, emitting, light, matte, mirror};
 use crate::measure::{Region, measure};

@@ -7,9 +7,9 @@
 use std::f64::consts::PI;
 
 use glam::dvec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, EmissionChoice, Estimator, RenderConfig};
-use ppm_vk::layout::CAUSTIC;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, EmissionChoice, Estimator, RenderConfig};
+use ppm_vk::internals::layout::CAUSTIC;
 
 use crate::document::{Document, clear, light, matte, mirror};
 use crate::energy::{photon_lanes, xyz};
@@ -142,7 +142,7 @@ fn photons_pass_a_plate_as_fresnel_says_at_every_angle() {
         .position(|object| object.name == "floor")
         .expect("a floor");
     for photon in photon_lanes(&mut renderer).iter().flatten() {
-        let cos = ppm_vk::cpu::decode_direction(photon.flux_direction[3].to_bits()).y;
+        let cos = ppm_vk::internals::cpu::decode_direction(photon.flux_direction[3].to_bits()).y;
         let bin = ((1.0 - cos * cos) / STEEPEST * BINS as f64) as usize;
         if bin < BINS {
             counts[bin][usize::from(photon.position_object[3].to_bits() & !CAUSTIC == floor as u32)] += 1.0;

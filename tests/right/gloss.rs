@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, dvec3};
-use ppm_vk::config::{Direct, RenderConfig};
-use ppm_vk::cpu::Reflector;
-use ppm_vk::random::{PathKind, Random};
+use ppm_vk::internals::config::{Direct, RenderConfig};
+use ppm_vk::internals::cpu::Reflector;
+use ppm_vk::internals::random::{PathKind, Random};
 
 use crate::document::{Document, light, matte, metallic_roughness};
 use crate::measure::{Measured, Region, measure};

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use ppm_vk::config::{Direct, RenderConfig};
+use ppm_vk::internals::config::{Direct, RenderConfig};
 
 use crate::document::{Document, Filter, light, matte, mirror, png, with_texture};
 use crate::measure::{Measured, Region, measure};

@@ -3,11 +3,11 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
 use glam::DVec3;
-use ppm_vk::config::{Direct, Estimator, RenderConfig};
-use ppm_vk::cpu::Reflector;
-use ppm_vk::film::Image;
-use ppm_vk::metrics::compare;
-use ppm_vk::scene::Environment;
+use ppm_vk::internals::config::{Direct, Estimator, RenderConfig};
+use ppm_vk::internals::cpu::Reflector;
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::metrics::compare;
+use ppm_vk::internals::scene::Environment;
 use serde_json::{Value, json};
 
 use crate::document::{Document, clear, light, matte, metallic_roughness, mirror};

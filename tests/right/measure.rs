@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{RenderConfig, Sampler};
-use ppm_vk::film::Image;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{RenderConfig, Sampler};
+use ppm_vk::internals::film::Image;
 
 use crate::picture::Subject;
 

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, dvec2, dvec3};
-use ppm_vk::config::{Direct, EmissionChoice, RenderConfig};
-use ppm_vk::layout::{CAUSTIC, Photon};
+use ppm_vk::internals::config::{Direct, EmissionChoice, RenderConfig};
+use ppm_vk::internals::layout::{CAUSTIC, Photon};
 use serde_json::json;
 
 use crate::document::{Document, clear, matte};

@@ -1,11 +1,11 @@
 //! Pictures of other renderers, and the program's own by other settings.
 
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, Estimator, RenderConfig};
-use ppm_vk::film::Image;
-use ppm_vk::loader::LoadOptions;
-use ppm_vk::scene::Environment;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, Estimator, RenderConfig};
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::loader::LoadOptions;
+use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::Scene;
 
 use crate::measure::{Measured, measure};
 use crate::picture::{Subject, folder, reference, small};

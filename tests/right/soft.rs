@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
 use glam::DVec3;
-use ppm_vk::config::{Direct, RenderConfig};
-use ppm_vk::cpu::Reflector;
+use ppm_vk::internals::config::{Direct, RenderConfig};
+use ppm_vk::internals::cpu::Reflector;
 use serde_json::{Value, json};
 
 use crate::document::{Document, clear, matte, metallic_roughness, mirror};
@@ -20,7 +20,7 @@ fn soften(subject: Subject, extent: f64) -> Subject {
     let mut scene = subject.scene;
     let scale = scene.normalisation.scale;
     for light in &mut scene.lights {
-        let is_sun = matches!(light.emission, ppm_vk::scene::Emission::Directional { .. });
+        let is_sun = matches!(light.emission, ppm_vk::internals::scene::Emission::Directional { .. });
         light.extent = if is_sun { extent } else { extent * scale };
     }
     Subject::of(scene)

@@ -4,10 +4,10 @@ use std::f64::consts::PI;
 use std::fs;
 
 use glam::{DVec3, dvec3};
-use ppm_vk::loader::LoadOptions;
-use ppm_vk::scene::Environment;
-use ppm_vk::scene::Projection;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::loader::LoadOptions;
+use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::Projection;
+use ppm_vk::internals::scene::Scene;
 use tempfile::TempDir;
 
 use crate::document::Document;

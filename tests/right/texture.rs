@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3, dvec3};
-use ppm_vk::config::{Direct, RenderConfig};
-use ppm_vk::scene::Environment;
+use ppm_vk::internals::config::{Direct, RenderConfig};
+use ppm_vk::internals::scene::Environment;
 use serde_json::json;
 
 use crate::document::{Document, Filter, light, matte, png, with_texture};

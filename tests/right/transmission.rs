@@ -1,9 +1,9 @@
 //! Glass that absorbs, is rough, a thin wall, or a part of a surface, in rooms whose walls all have radiance 1.
 
 use glam::{DVec3, dvec3};
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, RenderConfig};
-use ppm_vk::cpu::{self, Reflector};
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, RenderConfig};
+use ppm_vk::internals::cpu::{self, Reflector};
 use serde_json::{Value, json};
 
 use crate::document::{Document, light};

@@ -1,7 +1,7 @@
 //! Nodes at a time of the file's animations.
 
 use glam::{Quat, Vec3};
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close, assert_error, world_soup};
@@ -27,7 +27,7 @@ fn without_a_time_everything_is_at_rest_and_that_is_said() {
     let mut room = Fixture::room();
     let output = room.add_vectors(&along_x(&[0.5, 0.75]));
     room.animate(1, "translation", "LINEAR", &[0.0, 1.0], output);
-    let scene = room.assert_warns(&["animations", "--frame-time"]);
+    let scene = room.assert_warns(&["animations", "need a time"]);
     assert_close(lamp_corner(&scene), [0.0, 1.0, 0.0]);
 }
 

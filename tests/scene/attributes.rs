@@ -1,7 +1,7 @@
 //! Texture coordinates, colours and tangents of vertices.
 
 use glam::{Vec2, Vec3, Vec4};
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_close};

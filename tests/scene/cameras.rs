@@ -3,8 +3,8 @@
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use glam::Vec3;
-use ppm_vk::scene::Camera;
-use ppm_vk::scene::Projection;
+use ppm_vk::internals::scene::Camera;
+use ppm_vk::internals::scene::Projection;
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_close};
@@ -166,7 +166,7 @@ fn a_lens_is_focused_on_the_centre_of_the_scene_or_where_it_is_told() {
         ..camera.clone()
     };
     let error = scene.lens(&turned, 0.1, None).expect_err("an error").to_string();
-    assert!(error.contains("--focus"), "{error}");
+    assert!(error.contains("in focus"), "{error}");
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! What a file leaves to choose: material variants and scenes.
 
-use ppm_vk::error::Result;
-use ppm_vk::loader::LoadOptions;
-use ppm_vk::scene::Scene;
+use ppm_vk::LoadChoice;
+use ppm_vk::internals::error::Result;
+use ppm_vk::internals::loader::LoadOptions;
+use ppm_vk::internals::scene::Scene;
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_error};
@@ -65,7 +66,7 @@ fn unknown_variants_are_named_with_those_that_there_are() {
     );
     assert_error(
         load(&Fixture::room(), Some("rusty"), None),
-        &["\"rusty\"", "leave out --variant"],
+        &["\"rusty\"", "ask for none"],
     );
     let mut damaged = room();
     damaged.set("/extensions", json!({VARIANTS: {"variants": 7}}));
@@ -108,7 +109,7 @@ fn the_default_scene_is_rendered_and_said_where_there_are_several() {
         assert_eq!(scene.notes.len(), usize::from(!said.is_empty()), "{:?}", scene.notes);
         if let [note] = &scene.notes[..] {
             assert!(
-                note.starts_with(said) && note.contains("--scene-name") && note.contains("1 \"lamp alone\""),
+                note.starts_with(said) && note.choice() == Some(LoadChoice::Scene) && note.contains("1 \"lamp alone\""),
                 "{note}"
             );
         }
@@ -152,5 +153,5 @@ fn unknown_scenes_are_named_with_those_that_there_are() {
     assert_error(load(&room, None, Some("2")), &["\"2\""]);
     let mut room = Fixture::room();
     room.remove("/scenes").remove("/scene");
-    assert_error(load(&room, None, Some("0")), &["leave out --scene-name"]);
+    assert_error(load(&room, None, Some("0")), &["ask for none"]);
 }

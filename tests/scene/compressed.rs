@@ -1,6 +1,6 @@
 //! Meshes compressed by `EXT_meshopt_compression`.
 
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 
 use crate::encoded::{MESHOPT, compress, meshopt_room};

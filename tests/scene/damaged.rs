@@ -262,6 +262,6 @@ fn buffers_and_triangles_take_no_more_memory_than_the_scene_may() {
         .expect("600 kB of indices, 2 MB of triangles");
     for (limit, what) in [(100_000, "what its buffers hold"), (1_500_000, "mesh 0")] {
         let error = room.load_within(limit).expect_err("too large").to_string();
-        assert!(error.contains(what) && error.contains("--memory-limit 1"), "{error}");
+        assert!(error.contains(what) && error.contains("allow more"), "{error}");
     }
 }

@@ -1,7 +1,7 @@
 //! Morph targets and skins.
 
 use glam::Vec3;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_close, assert_error, world_soup};

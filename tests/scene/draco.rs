@@ -1,7 +1,7 @@
 //! Meshes compressed by `KHR_draco_mesh_compression`.
 
 use draco_core::{DataType, GeometryAttributeType};
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::json;
 
 use crate::encoded::{Attribute, DRACO, EDGEBREAKER, SEQUENTIAL, VALENCE, add_compressed, draco_room, encode};

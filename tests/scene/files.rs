@@ -5,7 +5,7 @@ use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_error};
@@ -149,7 +149,7 @@ fn a_missing_or_short_buffer_is_named() {
 fn buffers_of_absurd_size_are_refused_before_they_are_read() {
     let mut room = Fixture::room();
     room.set("/buffers/0/byteLength", json!(1u64 << 60));
-    room.assert_fails(&["what its buffers hold", "--memory-limit"]);
+    room.assert_fails(&["what its buffers hold", "allow more"]);
 }
 
 #[test]

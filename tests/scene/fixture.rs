@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
-use ppm_vk::error::{Error, Result};
-use ppm_vk::loader::LoadOptions;
-use ppm_vk::scene::Environment;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::error::{Error, Result};
+use ppm_vk::internals::loader::LoadOptions;
+use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -335,7 +335,7 @@ pub fn assert_error(result: Result<Scene>, parts: &[&str]) {
         Ok(scene) => panic!("should fail, but loads with the warnings {:?}", scene.warnings),
         Err(error) => error,
     };
-    let Error::Scene { path, what } = &error else {
+    let (Error::Scene { path, what } | Error::Memory { path, what, .. }) = &error else {
         panic!("not an error about a scene: {error:?}");
     };
     assert!(!what.contains('\n') && what.len() < 500, "not a line: {what:?}");
@@ -344,7 +344,7 @@ pub fn assert_error(result: Result<Scene>, parts: &[&str]) {
         "doesn't begin with the path: {error}"
     );
     for part in parts {
-        assert!(what.contains(part), "no {part:?} in: {what}");
+        assert!(error.to_string().contains(part), "no {part:?} in: {error}");
     }
 }
 

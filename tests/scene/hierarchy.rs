@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close};

@@ -5,12 +5,13 @@ use std::f64::consts::PI;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
-use ppm_vk::loader::LightUnits;
-use ppm_vk::loader::LoadOptions;
-use ppm_vk::packing::EmissiveTriangle;
-use ppm_vk::packing::PackedScene;
-use ppm_vk::scene::Emission;
-use ppm_vk::scene::Environment;
+use ppm_vk::internals::loader::LightUnits;
+use ppm_vk::internals::loader::LoadOptions;
+use ppm_vk::internals::packing::EmissiveTriangle;
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::scene::Emission;
+use ppm_vk::internals::scene::Environment;
+use ppm_vk::{LoadChoice, Remark};
 use serde_json::{Value, json};
 
 use crate::fixture::Fixture;
@@ -61,7 +62,7 @@ fn a_scene_without_light_is_lit_by_radiance_1_from_all_around_and_says_so() {
         json!({"emissiveStrength": 0}),
     );
     for room in [&mut unlit, &mut without_lamp, &mut turned_off] {
-        let scene = room.assert_warns(&["no light", "--environment"]);
+        let scene = room.assert_warns(&["no light", "radiance 1"]);
         assert_eq!(scene.environment, Some(Environment::constant(Vec3::ONE)));
     }
     let dim = Environment::constant(Vec3::splat(0.1));
@@ -294,7 +295,7 @@ fn lamps_of_blenders_exporter_are_divided_by_683_and_it_is_said() {
         assert_eq!(&found, expected, "{generator}, {units:?}");
         assert_eq!(lamp, power, "what emits is taken as it is: {generator}, {units:?}");
         assert_eq!(notes.len(), usize::from(said), "{generator}, {units:?}: {notes:?}");
-        let says = |note: &String| note.contains("683") && note.contains("--light-units spec");
+        let says = |note: &Remark| note.contains("683") && note.choice() == Some(LoadChoice::LightUnits);
         assert!(notes.iter().all(says), "{notes:?}");
     }
     let mut unlit = Fixture::room();

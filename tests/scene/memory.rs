@@ -1,8 +1,8 @@
 //! What a scene may take of memory in all.
 
-use ppm_vk::film::Image;
-use ppm_vk::loader::LoadOptions;
-use ppm_vk::scene::Environment;
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::loader::LoadOptions;
+use ppm_vk::internals::scene::Environment;
 use serde_json::json;
 
 use crate::fixture::Fixture;
@@ -58,8 +58,8 @@ fn buffers_geometry_images_and_the_environment_are_added_up_to_one_limit() {
         three_images - two_images >= 4 * texels,
         "{two_images}, {three_images}: images aren't added up"
     );
-    let limit = ppm_vk::text::bytes(three_images - 1);
-    for words in ["an image of 128x128 texels needs", "beside", &limit, "--memory-limit 1"] {
+    let limit = ppm_vk::internals::text::bytes(three_images - 1);
+    for words in ["an image of 128x128 texels needs", "beside", &limit, "allow more"] {
         assert!(
             said.contains(words) && !said.contains('\n'),
             "«{words}» isn't in: {said}"

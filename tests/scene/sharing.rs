@@ -1,8 +1,8 @@
 //! Which primitives nodes share.
 
 use glam::Vec3;
-use ppm_vk::scene::SHARED;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::SHARED;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close};
@@ -48,7 +48,7 @@ fn a_primitive_that_two_nodes_show_is_stored_once() {
     // The fan's middle.
     let middle = scene.triangles[first.triangles.start as usize].vertices[2];
     let middle = scene.positions[middle as usize];
-    let world = |object: &ppm_vk::scene::Object| {
+    let world = |object: &ppm_vk::internals::scene::Object| {
         let render = object.placement.expect("a placement").point(middle).as_dvec3();
         (render / scene.normalisation.scale + scene.normalisation.centre).as_vec3()
     };

@@ -1,9 +1,9 @@
 //! Glass without a volume: thin by the specification, solid by `LoadOptions::solid_glass` where its mesh is closed.
 
-use ppm_vk::loader::LoadOptions;
-use ppm_vk::scene::Dielectric;
-use ppm_vk::scene::Scene;
-use ppm_vk::scene::Surface;
+use ppm_vk::internals::loader::LoadOptions;
+use ppm_vk::internals::scene::Dielectric;
+use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::Surface;
 use serde_json::json;
 
 use crate::fixture::Fixture;
@@ -65,7 +65,7 @@ fn glass_without_a_volume_is_thin_and_named() {
     let [note] = &scene.notes[..] else {
         panic!("one note expected: {:?}", scene.notes);
     };
-    for part in ["material 0 \"glass\"", "thin wall", "--solid-glass"] {
+    for part in ["material 0 \"glass\"", "thin wall", "bend light"] {
         assert!(note.contains(part), "no {part:?} in: {note}");
     }
 }

@@ -67,7 +67,7 @@ fn triangles_beyond_number_around_a_point_are_named() {
     );
     let scene = room.scene();
     assert!(scene.tangents.is_empty());
-    let warnings = scene.warnings.join("\n");
+    let warnings = scene.warnings[0].text();
     assert!(
         warnings.contains("mesh 0 \"floor\", primitive 0: its normal texture needs tangents"),
         "{warnings}"

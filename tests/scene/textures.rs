@@ -3,8 +3,8 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use glam::DVec2;
-use ppm_vk::layout::{CLAMP, MIRROR_REPEAT, NEAREST, SECOND_SET, SRGB, WRAP_U, WRAP_V};
-use ppm_vk::scene::Alpha;
+use ppm_vk::internals::layout::{CLAMP, MIRROR_REPEAT, NEAREST, SECOND_SET, SRGB, WRAP_U, WRAP_V};
+use ppm_vk::internals::scene::Alpha;
 use serde_json::{Value, json};
 
 use super::encoded::{KTX2, webp};
@@ -301,7 +301,7 @@ fn images_take_no_more_memory_than_the_scene_may() {
     let (result, peak) = peak_of(|| load(20 << 20));
     let error = result.expect_err("too large").to_string();
     assert!(
-        error.contains("an image of 512x512 texels") && error.contains("--memory-limit") && !error.contains('\n'),
+        error.contains("an image of 512x512 texels") && error.contains("allow more") && !error.contains('\n'),
         "{error}"
     );
     // Pixels move to where there is room for more of them.

@@ -1,13 +1,13 @@
 //! Grids that would have more cells than memory, radii of every size, photons that don't fit.
 
 use glam::Vec3;
-use ppm_vk::config::{Direct, EmissionChoice, RenderConfig};
-use ppm_vk::cpu::{self, SeenByKernels};
-use ppm_vk::gather::METHODS;
-use ppm_vk::layout::{Gathered, Photon, Statistics, VisiblePoint};
-use ppm_vk::scene::Scene;
-use ppm_vk::sizes::Probe;
-use ppm_vk::stage::BufferId;
+use ppm_vk::internals::config::{Direct, EmissionChoice, RenderConfig};
+use ppm_vk::internals::cpu::{self, SeenByKernels};
+use ppm_vk::internals::gather::METHODS;
+use ppm_vk::internals::layout::{Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::sizes::Probe;
+use ppm_vk::internals::stage::BufferId;
 
 use super::bench::{Bench, object, photon, random_numbers, visible_point, xyz};
 use super::model::Model;
@@ -202,7 +202,7 @@ fn pilot_paths_whose_photons_do_not_fit_are_learned_from_in_smaller_batches() {
     println!("{} paths in a batch", sizes.batch_paths);
     assert!(tight.renderer.aim().is_some(), "nothing was aimed");
     assert!((20..1000).contains(&sizes.batch_paths), "{sizes:?}");
-    let mean = |image| ppm_vk::metrics::mean(image)[0];
+    let mean = |image| ppm_vk::internals::metrics::mean(image)[0];
     let ratio = mean(&tight.image) / mean(&free.image);
     assert!((ratio - 1.0).abs() < 0.03, "{ratio} of the light");
 }

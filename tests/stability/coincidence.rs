@@ -1,12 +1,12 @@
 //! Faces in one place: which of them a ray meets is no chance.
 
 use glam::Vec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Accel, Direct, RenderConfig, TriangleTest};
-use ppm_vk::cpu;
-use ppm_vk::film::Image;
-use ppm_vk::packing::PackedScene;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Accel, Direct, RenderConfig, TriangleTest};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::json;
 
 use super::model::{Model, parallelogram};

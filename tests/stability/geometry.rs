@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use glam::Vec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, EmissionChoice, RenderConfig};
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, EmissionChoice, RenderConfig};
 
 use super::model::{Model, parallelogram};
 use super::sound::{assert_mean, render, square};

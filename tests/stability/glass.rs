@@ -3,13 +3,14 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, EmissionChoice, Estimator, RenderConfig};
-use ppm_vk::cpu;
-use ppm_vk::layout::{NO_OBJECT, Settings, VisiblePoint};
-use ppm_vk::packing::PackedScene;
-use ppm_vk::scene::Scene;
-use ppm_vk::stage::BufferId;
+use ppm_vk::Warning;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, EmissionChoice, Estimator, RenderConfig};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::layout::{NO_OBJECT, Settings, VisiblePoint};
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::stage::BufferId;
 use serde_json::json;
 
 use super::bench::{object, xyz};
@@ -76,11 +77,9 @@ fn a_camera_inside_a_glass_box_sees_n_squared_times_the_light_outside_or_total_r
         truncated >= trapped * u64::from(iterations),
         "{truncated} paths are said to be cut"
     );
-    let warnings = rendered.counters.warnings(rendered.renderer.emitted(), max_depth);
-    assert!(
-        warnings.iter().any(|warning| warning.contains("--max-depth")),
-        "{warnings:?}"
-    );
+    let warnings = Warning::of(&rendered.counters, rendered.renderer.emitted(), max_depth);
+    let is_told = |warning: &Warning| matches!(warning, Warning::Truncated { .. }) && !warning.is_slight();
+    assert!(warnings.iter().any(is_told), "{warnings:?}");
 }
 
 /// A small lamp in the middle of a glass ball: what the ball reflects comes back to the lamp, which absorbs it as the
@@ -164,7 +163,7 @@ fn reflectance_at_the_critical_angle_is_fresnels_to_within_rounding_of_the_angle
         let points: Vec<VisiblePoint> = rendered.download(BufferId::VisiblePoints);
         let (mut total, mut partial) = (0, 0);
         for (pixel_slot, points) in (0..).zip(points.chunks(settings.slots_per_pixel as usize)) {
-            let [x, y] = ppm_vk::config::pixel_of(settings.resolution, pixel_slot)
+            let [x, y] = ppm_vk::internals::config::pixel_of(settings.resolution, pixel_slot)
                 .expect("whole tiles")
                 .map(f64::from);
             let cos_i = direction(&settings, x + 0.5, y + 0.5).z;
@@ -295,13 +294,11 @@ fn paths_in_a_room_of_mirrors_end_at_the_lamp_or_are_counted() {
     assert_eq!(lit + dark, 32 * 32, "pixels have the lamp's radiance or none");
     assert!(dark > 100 && lit > 100, "{dark} dark, {lit} lit pixels");
     assert_eq!(counters.truncated_paths, dark + (paths - counters.photons_stored));
-    let warnings = counters.warnings(rendered.renderer.emitted(), max_depth);
-    let expected = format!(
-        "{} camera and photon paths reached --max-depth 64",
-        counters.truncated_paths
-    );
-    assert!(
-        warnings.len() == 1 && warnings[0].starts_with(&expected),
-        "{warnings:?}"
-    );
+    let emitted = rendered.renderer.emitted();
+    let expected = Warning::Truncated {
+        paths: counters.truncated_paths,
+        emitted,
+        max_depth,
+    };
+    assert_eq!(Warning::of(&counters, emitted, max_depth), [expected]);
 }

@@ -1,11 +1,11 @@
 //! Lamps and cameras in liquids.
 
 use glam::Vec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::config::{Direct, RenderConfig};
-use ppm_vk::cpu;
-use ppm_vk::packing::PackedScene;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::config::{Direct, RenderConfig};
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::json;
 
 use super::model::Model;

@@ -1,13 +1,13 @@
 //! Lights and photons of very different power together.
 
 use glam::Vec3;
-use ppm_vk::config::RenderConfig;
-use ppm_vk::gather::METHODS;
-use ppm_vk::layout::{Gathered, Photon, VisiblePoint};
-use ppm_vk::record::Recording;
-use ppm_vk::scene::Scene;
-use ppm_vk::shaders;
-use ppm_vk::stage::{BufferId, StageDesc};
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::gather::METHODS;
+use ppm_vk::internals::layout::{Gathered, Photon, VisiblePoint};
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::stage::{BufferId, StageDesc};
 
 use super::bench::{Bench, photon, visible_point};
 use super::model::Model;

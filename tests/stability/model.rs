@@ -1,7 +1,7 @@
 //! Scenes of a few simple shapes, as glTF.
 
 use glam::{DVec3, Vec3};
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -153,7 +153,7 @@ impl Model {
     #[track_caller]
     pub fn scene(&self) -> Scene {
         let scene = self.file.scene();
-        assert_eq!(scene.warnings, Vec::<String>::new());
+        assert_eq!(scene.warnings, [""; 0]);
         scene
     }
 }

@@ -1,10 +1,10 @@
 //! Dielectrics inside of others, touching or overlapping them.
 
 use glam::Vec3;
-use ppm_vk::backend::Backend;
-use ppm_vk::cpu;
-use ppm_vk::packing::PackedScene;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::backend::Backend;
+use ppm_vk::internals::cpu;
+use ppm_vk::internals::packing::PackedScene;
+use ppm_vk::internals::scene::Scene;
 use serde_json::json;
 
 use super::model::Model;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use ppm_vk::film::Image;
-use ppm_vk::metrics::compare;
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::metrics::compare;
+use ppm_vk::internals::scene::Scene;
 use serde_json::{Value, json};
 
 use super::sound::{render, square};

@@ -1,13 +1,13 @@
 //! Renders whose every buffer is searched for what must not be there.
 
-use ppm_vk::backend::{Backend, Counters};
-use ppm_vk::config::RenderConfig;
-use ppm_vk::film::Image;
-use ppm_vk::gpu::Device;
-use ppm_vk::layout::{DirectSum, Gathered, NO_OBJECT, Photon, Statistics, VisiblePoint};
-use ppm_vk::pipeline::Renderer;
-use ppm_vk::scene::Scene;
-use ppm_vk::stage::BufferId;
+use ppm_vk::internals::backend::{Backend, Counters};
+use ppm_vk::internals::config::RenderConfig;
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::layout::{DirectSum, Gathered, NO_OBJECT, Photon, Statistics, VisiblePoint};
+use ppm_vk::internals::pipeline::Renderer;
+use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::stage::BufferId;
 
 use super::bench::packed;
 

@@ -1,15 +1,15 @@
 //! Equations 2 and 3 over very many iterations and photons, and at the ends of α's range.
 
 use bytemuck::Zeroable;
-use ppm_vk::config::{RenderConfig, Totals};
-use ppm_vk::film::Image;
-use ppm_vk::gather::METHODS;
-use ppm_vk::layout::{Coverage, DirectSum, Gathered, Photon, Statistics, VisiblePoint};
-use ppm_vk::packing::SceneFeatures;
-use ppm_vk::pipeline::Stages;
-use ppm_vk::record::Recording;
-use ppm_vk::shaders;
-use ppm_vk::stage::{BufferId, StageDesc};
+use ppm_vk::internals::config::{RenderConfig, Totals};
+use ppm_vk::internals::film::Image;
+use ppm_vk::internals::gather::METHODS;
+use ppm_vk::internals::layout::{Coverage, DirectSum, Gathered, Photon, Statistics, VisiblePoint};
+use ppm_vk::internals::packing::SceneFeatures;
+use ppm_vk::internals::pipeline::Stages;
+use ppm_vk::internals::record::Recording;
+use ppm_vk::internals::shaders;
+use ppm_vk::internals::stage::{BufferId, StageDesc};
 
 use super::bench::{Bench, photon, visible_point, xyz};
 use super::sound::assert_sound;

@@ -4,8 +4,8 @@
 use std::f64::consts::PI;
 
 use glam::Vec3;
-use ppm_vk::config::{Direct, EmissionChoice, RenderConfig};
-use ppm_vk::scene::Scene;
+use ppm_vk::internals::config::{Direct, EmissionChoice, RenderConfig};
+use ppm_vk::internals::scene::Scene;
 
 use super::bench::object;
 use super::model::Model;

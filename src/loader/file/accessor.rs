@@ -1,8 +1,8 @@
 //! Accessors as vectors of numbers or as indices, in the formats that glTF allows for each use.
 
-use gltf::json::accessor::ComponentType::{F32, I8, I16, U8, U16, U32};
-use gltf::json::accessor::Type;
-use gltf::json::{Accessor, Index};
+use gltf_json::accessor::ComponentType::{F32, I8, I16, U8, U16, U32};
+use gltf_json::accessor::Type;
+use gltf_json::{Accessor, Index};
 
 use super::document::Document;
 use super::elements::{Elements, Format, unsigned};

@@ -116,7 +116,7 @@ mod tests {
     fn said(root: &Value) -> Vec<String> {
         let mut warnings = Warnings::default();
         warn(root, &mut warnings);
-        warnings.into_lines()
+        warnings.into_lines().iter().map(ToString::to_string).collect()
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::fmt::Display;
+use std::rc::Rc;
 
 use crate::loader::diagnostic::Check;
 use crate::text::bytes;
@@ -16,9 +17,20 @@ pub const MEMORY_LIMIT: u64 = 2 << 30;
 pub(crate) struct Budget {
     limit: u64,
     taken: Cell<u64>,
-    /// The first refusal.
-    refused: RefCell<Option<String>>,
+    refused: FirstRefusal,
 }
+
+/// More than the limit was asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Refusal {
+    /// By what.
+    pub what: String,
+    /// The limit that would have been enough, bytes.
+    pub needed: u64,
+}
+
+/// The first refusal of a budget; it outlives the budget.
+pub(crate) type FirstRefusal = Rc<RefCell<Option<Refusal>>>;
 
 impl Budget {
     /// Nothing is taken yet.
@@ -26,8 +38,13 @@ impl Budget {
         Self {
             limit,
             taken: Cell::new(0),
-            refused: RefCell::new(None),
+            refused: FirstRefusal::default(),
         }
+    }
+
+    /// Where the first refusal will be.
+    pub(crate) fn refused(&self) -> FirstRefusal {
+        Rc::clone(&self.refused)
     }
 
     /// Takes `size` bytes for `what`, to be kept.
@@ -44,21 +61,26 @@ impl Budget {
         if needed <= self.limit {
             return Ok(());
         }
-        let gibibytes = needed.div_ceil(1 << 30);
         let text = format!(
-            "{what} needs {} of memory beside {} of the rest of the scene, which may take {} in all; make it smaller, or allow more, \
-             such as --memory-limit {gibibytes}",
+            "{what} needs {} of memory beside {} of the rest of the scene, which may take {} in all",
             bytes(size),
             bytes(taken),
             bytes(self.limit)
         );
-        self.refused.borrow_mut().get_or_insert_with(|| text.clone());
+        let refusal = Refusal {
+            what: text.clone(),
+            needed,
+        };
+        self.refused.borrow_mut().get_or_insert(refusal);
         Err(text)
     }
 
     /// Fails if anything was refused, though the scene could do without it.
     pub(crate) fn settle(&self) -> Check<()> {
-        self.refused.borrow().clone().map_or(Ok(()), Err)
+        self.refused
+            .borrow()
+            .clone()
+            .map_or(Ok(()), |refusal| Err(refusal.what))
     }
 }
 
@@ -67,16 +89,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_goes_over_the_limit_is_refused_with_the_flag_that_allows_it() {
+    fn what_goes_over_the_limit_is_refused_with_the_limit_that_allows_it() {
         let budget = Budget::new(3 << 30);
         budget.take(1 << 30, "a buffer").expect("room");
         budget.check(2 << 30, "an image").expect("room");
         budget.settle().expect("nothing was refused");
         let error = budget.take((2 << 30) + 1, "image 3").expect_err("no room");
-        assert!(
-            error.starts_with("image 3 needs 2.0 GiB") && error.contains("--memory-limit 4"),
-            "{error}"
-        );
+        assert!(error.starts_with("image 3 needs 2.0 GiB"), "{error}");
+        let refused = budget.refused().borrow().clone().expect("a refusal");
+        assert_eq!((refused.what, refused.needed), (error.clone(), (3 << 30) + 1));
         assert_eq!(budget.settle(), Err(error));
         budget.check(u64::MAX, "all").expect_err("no room");
     }

@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use base64::Engine;
 use base64::engine::DecodePaddingMode;
 use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
-use gltf::json::{Buffer, Root};
+use gltf_json::{Buffer, Root};
 
 use super::budget::Budget;
 use super::meshopt;

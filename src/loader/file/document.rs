@@ -8,8 +8,8 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use gltf::json::Root;
-use gltf::json::buffer::View;
+use gltf_json::Root;
+use gltf_json::buffer::View;
 use serde_json::Value;
 
 use super::budget::Budget;

@@ -7,10 +7,10 @@ use draco_core::draco_types::DataType;
 use draco_core::geometry_attribute::PointAttribute;
 use draco_core::geometry_indices::PointIndex;
 use draco_core::{DecodeLimits, DecoderBuffer, Mesh, MeshDecoder};
-use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
-use gltf::json::mesh::{Mode, Primitive};
-use gltf::json::validation::{Checked, USize64};
-use gltf::json::{Accessor, Index};
+use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
+use gltf_json::mesh::{Mode, Primitive};
+use gltf_json::validation::{Checked, USize64};
+use gltf_json::{Accessor, Index};
 use serde::Deserialize;
 
 use super::document::Document;
@@ -70,7 +70,7 @@ pub(crate) fn decompress(document: &mut Document, warnings: &mut Warnings) -> Ch
 }
 
 /// What the accessors of a primitive become; the indices have no name.
-type Parts = Vec<(Option<Checked<gltf::json::mesh::Semantic>>, Accessor, Vec<u8>)>;
+type Parts = Vec<(Option<Checked<gltf_json::mesh::Semantic>>, Accessor, Vec<u8>)>;
 
 #[derive(Default)]
 struct Decoder {

@@ -2,10 +2,10 @@
 
 use std::fmt::Debug;
 
-use gltf::json::accessor::{ComponentType, Type, sparse};
-use gltf::json::buffer::View;
-use gltf::json::validation::Checked;
-use gltf::json::{Accessor, Index};
+use gltf_json::accessor::{ComponentType, Type, sparse};
+use gltf_json::buffer::View;
+use gltf_json::validation::Checked;
+use gltf_json::{Accessor, Index};
 
 use super::buffer::slice;
 use super::document::Document;

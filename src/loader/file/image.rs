@@ -1,16 +1,15 @@
 //! Reads the images of a glTF file.
 
-use std::io::Cursor;
 use std::path::Path;
 
-use gltf::json;
-use image::{ImageFormat, ImageReader, Limits};
+use gltf_json as json;
 
 use super::budget::Budget;
 use super::buffer::read_uri;
 use super::document::Document;
 use super::ktx2;
 use super::ktx2::Ktx2;
+use super::raster::Raster;
 use crate::loader::diagnostic::{Check, damaged};
 
 /// Longest side of an image, in texels: sides are stored as 16 bits.
@@ -24,9 +23,8 @@ const DECODING_A_TEXEL: u64 = 8;
 
 /// Bytes at the most of a file that begins like this and holds one picture.
 fn most_bytes(head: &[u8]) -> u64 {
-    let reader = ImageReader::new(Cursor::new(head)).with_guessed_format();
-    let size = reader.ok().and_then(|reader| reader.into_dimensions().ok());
-    let pixels = size.map_or(u64::MAX, |(width, height)| u64::from(width) * u64::from(height));
+    let size = Raster::open(head).and_then(|raster| raster.size().ok());
+    let pixels = size.map_or(u64::MAX, |[width, height]| u64::from(width) * u64::from(height));
     pixels.saturating_mul(MEMORY_A_TEXEL).saturating_add(BESIDE_PIXELS)
 }
 
@@ -68,29 +66,19 @@ impl Pixels {
                 rgba: texels(&picture.decode()?),
             });
         }
-        let unreadable = |error| format!("it can't be decoded ({error}); export it as PNG, JPEG, WebP or KTX 2.0");
-        let format = match image::guess_format(bytes) {
-            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) => format,
-            Ok(other) => {
-                return Err(format!(
-                    "it is {other:?}, but only PNG, JPEG, WebP and KTX 2.0 are read; convert it"
-                ));
-            }
-            Err(_) => return Err("it is none of PNG, JPEG, WebP and KTX 2.0; convert it".into()),
-        };
-        let reader = || ImageReader::with_format(Cursor::new(bytes), format);
-        let (width, height) = reader().into_dimensions().map_err(unreadable)?;
-        let texels_of_all = take([width, height], budget)?;
-        let mut limits = Limits::default();
-        limits.max_alloc = Some(MEMORY_A_TEXEL * texels_of_all + (1 << 20));
-        let mut reader = reader();
-        reader.limits(limits);
-        let decoded = reader.decode().map_err(unreadable)?.into_rgba8();
-        Ok(Self {
-            width,
-            height,
-            rgba: texels(&decoded),
-        })
+        let unreadable =
+            |error: String| format!("it can't be decoded ({error}); export it as PNG, JPEG, WebP or KTX 2.0");
+        let raster = Raster::open(bytes).ok_or("it is none of PNG, JPEG, WebP and KTX 2.0; convert it")?;
+        let [width, height] = raster.size().map_err(unreadable)?;
+        let texels = take([width, height], budget)?;
+        let memory = (MEMORY_A_TEXEL * texels).saturating_add(1 << 20);
+        let rgba = raster
+            .rgba(usize::try_from(memory).unwrap_or(usize::MAX))
+            .map_err(unreadable)?;
+        if rgba.len() as u64 != texels {
+            return Err(unreadable("it has fewer pixels than it says".to_owned()));
+        }
+        Ok(Self { width, height, rgba })
     }
 }
 

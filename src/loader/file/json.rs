@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use gltf::json::Root;
+use gltf_json::Root;
 use serde_json::{Number, Value};
 
 use super::breaches;

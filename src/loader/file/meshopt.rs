@@ -3,8 +3,8 @@
 use crate::loader::extensions::MESHOPT;
 use std::collections::HashMap;
 
-use gltf::json::buffer::View;
-use gltf::json::{Buffer, Root};
+use gltf_json::buffer::View;
+use gltf_json::{Buffer, Root};
 use meshopt::{
     decode_filter_oct, decode_filter_quat, decode_index_buffer, decode_index_sequence, decode_vertex_buffer,
 };

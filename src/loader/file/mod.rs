@@ -12,3 +12,4 @@ pub(crate) mod image;
 pub(crate) mod json;
 pub(crate) mod ktx2;
 pub(crate) mod meshopt;
+mod raster;

@@ -1,9 +1,9 @@
 //! What the vertices of a primitive have.
 
 use glam::{DVec3, DVec4, Vec2, Vec4};
-use gltf::json::mesh::{Primitive, Semantic};
-use gltf::json::validation::Checked;
-use gltf::json::{Accessor, Index};
+use gltf_json::mesh::{Primitive, Semantic};
+use gltf_json::validation::Checked;
+use gltf_json::{Accessor, Index};
 
 use super::morph::MorphTarget;
 use crate::loader::diagnostic::{Check, damaged};

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use gltf::json::Root;
+use gltf_json::Root;
 
 use super::attributes::NotFinite;
 use super::facet::{face_normal, spans_area};

@@ -4,7 +4,7 @@ use crate::loader::extensions::MESH_INSTANCING;
 use std::collections::BTreeMap;
 
 use glam::{DAffine3, DQuat, DVec3};
-use gltf::json::{Accessor, Index};
+use gltf_json::{Accessor, Index};
 use serde::Deserialize;
 
 use crate::loader::diagnostic::{Check, damaged};

@@ -4,7 +4,7 @@ use super::primitive::FaceCorner;
 use std::rc::Rc;
 
 use glam::{DAffine3, DMat3, DVec3, DVec4, Vec4};
-use gltf::json::Root;
+use gltf_json::Root;
 
 use super::attributes::NotFinite;
 use super::facet::normal_matrix;

@@ -1,6 +1,6 @@
 //! Morph targets: what is added to the attributes of vertices, by weights (glTF 2.0, section 3.7.2.2).
 
-use gltf::json::mesh::Primitive;
+use gltf_json::mesh::Primitive;
 
 use super::attributes::optional;
 use crate::loader::animation::Pose;

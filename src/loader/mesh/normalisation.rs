@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use glam::DVec3;
-use gltf::json::Root;
+use gltf_json::Root;
 
 use super::facet::face_normal;
 use super::mesh_instance::MeshInstance;

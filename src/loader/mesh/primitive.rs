@@ -1,9 +1,9 @@
 //! A mesh primitive as a list of triangles, whatever its topology and index type.
 
 use glam::Vec4;
-use gltf::json::mesh;
-use gltf::json::mesh::Mode;
-use gltf::json::validation::Checked;
+use gltf_json::mesh;
+use gltf_json::mesh::Mode;
+use gltf_json::validation::Checked;
 
 use super::attributes::Attributes;
 use super::tangents::{MAX_AROUND, tangents};

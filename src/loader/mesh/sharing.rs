@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use glam::DAffine3;
-use gltf::json::Root;
+use gltf_json::Root;
 
 use super::facet::spans_area;
 use super::geometry::Geometry;

@@ -4,11 +4,12 @@
 use std::collections::{BTreeMap, HashMap};
 
 use glam::{DVec3, Vec3};
-use gltf::json::Root;
+use gltf_json::Root;
 
 use super::geometry::Geometry;
 use crate::loader::diagnostic::{Check, label};
 use crate::loader::material::solid;
+use crate::scene::{LoadChoice, Remark};
 use crate::scene::{Material, Object, Surface};
 use crate::text::{list, quote};
 
@@ -20,12 +21,13 @@ pub(crate) fn thin_glass(materials: &[Material], used: &[bool]) -> Vec<usize> {
 }
 
 /// What is to be said of them, if they stay as they are.
-pub(crate) fn note(root: &Root, thin: &[usize]) -> Option<String> {
+pub(crate) fn note(root: &Root, thin: &[usize]) -> Option<Remark> {
     (!thin.is_empty()).then(|| {
-        format!(
-            "glass without a volume is a thin wall, which doesn't bend light: {}; --solid-glass takes closed meshes of it as solid",
+        let what = format!(
+            "glass without a volume is a thin wall, which doesn't bend light: {}",
             list(&labels(root, thin))
-        )
+        );
+        Remark::with(LoadChoice::SolidGlass, what)
     })
 }
 
@@ -43,7 +45,7 @@ pub(crate) fn make_solid(
     geometry: &mut Geometry,
     materials: &mut Vec<Material>,
     thin: &[usize],
-) -> Check<Option<String>> {
+) -> Check<Option<Remark>> {
     let is_thin = |object: &Object| thin.contains(&(object.material as usize));
     let mut of_nodes: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (object, &node) in geometry.nodes.iter().enumerate() {
@@ -77,10 +79,12 @@ pub(crate) fn make_solid(
     }
     open.dedup();
     Ok((!open.is_empty()).then(|| {
-        format!(
-            "--solid-glass leaves {} a thin wall: not closed (each edge between two faces that look to the same side), or inside out",
+        let what = format!(
+            "{} can't be taken as solid glass and stays a thin wall: not closed (each edge between two faces that look to the same \
+             side), or inside out",
             list(&open)
-        )
+        );
+        Remark::from(what)
     }))
 }
 

@@ -1,0 +1,254 @@
+//! Rendering as a library's user sees it: a scene in, pictures out.
+
+mod prepared;
+mod rendered;
+mod until;
+mod warning;
+mod work;
+
+pub use prepared::PreparedScene;
+pub use rendered::{Failure, Rendered};
+pub use until::{Progress, Until};
+pub use warning::Warning;
+
+use std::time::{Duration, Instant};
+
+use crate::backend::{Backend, DeviceDescription};
+use crate::config::{MAX_SIDE, RenderConfig};
+use crate::error::Result;
+use crate::estimate::{ErrorEstimate, RelativeError, of_one_photon};
+use crate::film::Image;
+use crate::gather::{METHODS, default_cpu_method, default_method};
+use crate::gpu::Device;
+use crate::record::Run;
+use crate::scene::Camera;
+use crate::{cpu, pipeline};
+use work::Work;
+
+/// What a render runs on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Platform {
+    /// A Vulkan device: the one of this index or with this in its name, or the best one.
+    Vulkan(Option<String>),
+    /// The processor, without Vulkan: slow, and what the kernels are tested against.
+    Cpu,
+}
+
+impl Default for Platform {
+    fn default() -> Self {
+        Self::Vulkan(None)
+    }
+}
+
+/// What a program may say and ask while it waits for [`Session::render_with`].
+pub struct Hooks<'a> {
+    /// Asked between batches of photon paths: whether to stop early, with the picture so far.
+    pub stop: &'a dyn Fn() -> bool,
+    /// Told after every iteration.
+    pub progress: &'a dyn Fn(Progress),
+    /// Whether [`Rendered::profile`] has the launches: those of a day are gigabytes.
+    pub profile: bool,
+}
+
+impl Default for Hooks<'_> {
+    fn default() -> Self {
+        Self {
+            stop: &|| false,
+            progress: &|_| (),
+            profile: false,
+        }
+    }
+}
+
+enum Renderer {
+    Device(Box<pipeline::Renderer>),
+    Cpu(Box<cpu::Renderer>),
+}
+
+/// A progressive render of a scene, which goes on for as long as it is asked to.
+///
+/// ```no_run
+/// use ppm_vk::{Platform, PreparedScene, RenderConfig, Scene, Session, Until};
+///
+/// # fn main() -> ppm_vk::Result<()> {
+/// let scene = Scene::load("scenes/cornell-spheres.gltf".as_ref())?;
+/// let camera = &scene.cameras[0];
+/// let prepared = PreparedScene::new(&scene)?;
+/// let mut session = Session::new(&prepared, camera, &RenderConfig::of(camera), &Platform::default())?;
+/// let rendered = session.render(Until::iterations(64))?;
+/// rendered.write_exr("picture.exr".as_ref())?;
+/// # Ok(())
+/// # }
+/// ```
+pub struct Session {
+    renderer: Renderer,
+    config: RenderConfig,
+    estimate: ErrorEstimate,
+    warnings: Vec<Warning>,
+    scene: String,
+    /// Render units per scene unit.
+    scale: f64,
+    /// Rendering time so far.
+    spent: Duration,
+}
+
+impl Session {
+    /// Opens a device, uploads the scene, finds the first radii.
+    ///
+    /// # Errors
+    /// A setting outside its range, no usable device, or one without enough memory.
+    pub fn new(scene: &PreparedScene, camera: &Camera, config: &RenderConfig, platform: &Platform) -> Result<Self> {
+        let packed = scene.packed();
+        let is_cpu = *platform == Platform::Cpu;
+        let config = RenderConfig {
+            gather: config
+                .gather
+                .or(Some(if is_cpu { default_cpu_method() } else { default_method() })),
+            ..config.clone()
+        };
+        let renderer = match platform {
+            Platform::Vulkan(device) => {
+                let device = Device::open(device.as_deref())?;
+                Renderer::Device(Box::new(pipeline::Renderer::new(
+                    device,
+                    packed,
+                    camera,
+                    config.clone(),
+                )?))
+            }
+            Platform::Cpu => Renderer::Cpu(Box::new(cpu::Renderer::new(packed, camera, config.clone())?)),
+        };
+        let backend = renderer.backend();
+        let warnings = Warning::before(&packed.features, &config, backend.photon_maps());
+        let estimate = ErrorEstimate::new(&config, of_one_photon(packed, backend, &config));
+        Ok(Self {
+            renderer,
+            config,
+            estimate,
+            warnings,
+            scene: scene.name().to_owned(),
+            scale: packed.scale,
+            spent: Duration::ZERO,
+        })
+    }
+
+    /// Renders until a limit is reached.
+    ///
+    /// # Errors
+    /// What failed before there was a picture. Later failures are in [`Rendered::failure`].
+    pub fn render(&mut self, until: Until) -> Result<Rendered> {
+        self.render_with(until, &Hooks::default())
+    }
+
+    /// The same, by a program that shows how far it is or may stop it early. It can be called again, to go on.
+    ///
+    /// # Errors
+    /// As [`Session::render`].
+    pub fn render_with(&mut self, until: Until, hooks: &Hooks<'_>) -> Result<Rendered> {
+        let work = Work {
+            until,
+            estimate: self.estimate,
+            hooks,
+        };
+        let done = work.run(self.renderer.backend_mut())?;
+        self.spent += done.time;
+        Ok(Rendered::new(self, done))
+    }
+
+    /// Does one iteration, and returns what its launches took. Less than [`Session::render`] does: nothing is kept for the case
+    /// that the next one fails. `None`: `stop`, which is asked between batches of photon paths, ended it early, and it is left out.
+    ///
+    /// # Errors
+    /// Whatever the device can't do.
+    pub fn iterate(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
+        let begin = Instant::now();
+        let run = self.renderer.backend_mut().iterate_unless(stop);
+        self.spent += begin.elapsed();
+        run
+    }
+
+    /// The picture so far, and its error, where that can be told.
+    ///
+    /// # Errors
+    /// Whatever the device can't do.
+    pub fn picture(&mut self) -> Result<(Image, Option<RelativeError>)> {
+        let picture = self.renderer.backend_mut().resolve_all()?;
+        let error = self.estimate.relative(self.iterations(), &picture);
+        Ok((picture.image, error))
+    }
+
+    /// Iterations so far.
+    pub fn iterations(&self) -> u32 {
+        self.renderer.backend().iterations()
+    }
+
+    /// What it runs on.
+    pub fn device(&self) -> DeviceDescription {
+        self.renderer.backend().device()
+    }
+
+    /// The median of the initial radii, in scene units.
+    pub fn radius(&self) -> f64 {
+        f64::from(self.renderer.backend().radius()) / self.scale
+    }
+
+    /// Whether photon paths are aimed. They aren't where it was found not to be worth its cost, whatever the settings are.
+    pub fn is_aimed(&self) -> bool {
+        self.renderer.backend().aims()
+    }
+
+    /// Its settings.
+    pub fn config(&self) -> &RenderConfig {
+        &self.config
+    }
+
+    /// What is to be known before it begins.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// The gather method's name.
+    pub fn gather(&self) -> &'static str {
+        METHODS[self.config.gather.unwrap_or_default()].name
+    }
+
+    /// The renderer on a device, for benches of its parts; `None` on the CPU.
+    #[doc(hidden)]
+    pub fn on_device(&mut self) -> Option<&mut pipeline::Renderer> {
+        match &mut self.renderer {
+            Renderer::Device(renderer) => Some(renderer),
+            Renderer::Cpu(_) => None,
+        }
+    }
+}
+
+impl Renderer {
+    fn backend(&self) -> &dyn Backend {
+        match self {
+            Self::Device(renderer) => renderer.as_ref(),
+            Self::Cpu(renderer) => renderer.as_ref(),
+        }
+    }
+
+    fn backend_mut(&mut self) -> &mut dyn Backend {
+        match self {
+            Self::Device(renderer) => renderer.as_mut(),
+            Self::Cpu(renderer) => renderer.as_mut(),
+        }
+    }
+}
+
+/// Aspect ratio where a camera has none.
+const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
+
+impl RenderConfig {
+    /// The defaults, with a picture of the camera's aspect ratio.
+    pub fn of(camera: &Camera) -> Self {
+        let width = Self::DEFAULT.resolution[0];
+        let height = width as f32 / camera.aspect.unwrap_or(DEFAULT_ASPECT);
+        Self {
+            resolution: [width, (height.round() as u32).clamp(1, MAX_SIDE)],
+            ..Self::DEFAULT
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! A scene that sessions can render.
+
+use std::path::Path;
+
+use crate::config::RenderConfig;
+use crate::error::{Error, Result};
+use crate::gpu::DeviceSummary;
+use crate::packing::PackedScene;
+use crate::pipeline::Memory;
+use crate::scene::Scene;
+
+/// A scene with a hierarchy of its triangles, as any number of sessions read it.
+#[derive(Debug, Clone)]
+pub struct PreparedScene {
+    name: String,
+    packed: PackedScene,
+}
+
+impl PreparedScene {
+    /// Builds the hierarchy.
+    ///
+    /// # Errors
+    /// [`Error::Scene`], if there are too many triangles, or too many materials for glass that overlaps.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let path = scene.files.first().map_or(Path::new(&scene.name), |file| file);
+        Ok(Self {
+            name: scene.name.clone(),
+            packed: PackedScene::new(scene).map_err(|what| Error::scene(path, what))?,
+        })
+    }
+
+    /// The scene's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What a user should know of it, beside [`Scene::notes`].
+    pub fn notes(&self) -> &[String] {
+        &self.packed.notes
+    }
+
+    /// The features that the kernels are specialised for.
+    pub fn features(&self) -> Vec<String> {
+        self.packed.features.names()
+    }
+
+    /// Triangles that can be seen: those of an object count as often as it is there.
+    pub fn triangles(&self) -> u64 {
+        self.packed.seen_triangles()
+    }
+
+    /// What a render takes of a device's memory.
+    pub fn memory(&self, config: &RenderConfig, device: &DeviceSummary) -> Memory {
+        Memory::of(&self.packed, config, device)
+    }
+
+    /// As the device has it.
+    #[doc(hidden)]
+    pub fn packed(&self) -> &PackedScene {
+        &self.packed
+    }
+
+    /// The same with another layout, for benches.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with(&self, packed: PackedScene) -> Self {
+        Self {
+            name: self.name.clone(),
+            packed,
+        }
+    }
+}

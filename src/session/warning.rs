@@ -1,0 +1,165 @@
+//! What a picture lacks, and how much that is.
+
+use std::fmt;
+
+use crate::backend::Counters;
+use crate::config::{Estimator, RenderConfig};
+use crate::packing::SceneFeatures;
+
+/// The share of the light from which on its lack is a warning: no eye sees less.
+const TELLING_SHARE: f64 = 0.001;
+
+/// What a picture lacks, in a line. It names no program's flags: those follow from its kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The estimator of the paper keeps the first choice of what is chosen by chance: grain that stays.
+    KeptChoices,
+    /// Caustics have the radii of other light: a picture that large has one photon map.
+    OneMap,
+    /// Paths reached [`RenderConfig::max_depth`].
+    Truncated {
+        /// How many.
+        paths: u64,
+        /// Of so many photon paths.
+        emitted: u64,
+        /// The limit.
+        max_depth: u32,
+    },
+    /// Paths that the driver's loop limit ended.
+    Cut {
+        /// How many.
+        paths: u64,
+        /// Of so many photon paths.
+        emitted: u64,
+    },
+    /// Photons beyond [`RenderConfig::cell_photons`].
+    Lost {
+        /// How many.
+        photons: u64,
+        /// Of so many.
+        stored: u64,
+        /// In so many cells.
+        cells: u64,
+    },
+    /// Values that were NaN or infinite.
+    NonFinite {
+        /// How many.
+        values: u64,
+    },
+    /// No light at all.
+    Black,
+}
+
+impl Warning {
+    /// Of a render that is about to begin.
+    pub(super) fn before(features: &SceneFeatures, config: &RenderConfig, photon_maps: u32) -> Vec<Self> {
+        let chooses = features.dispersion || features.alpha || features.partly_clear || features.coat || features.soft;
+        let specular = features.mirror || features.dielectric;
+        let is_paper = config.estimator == Estimator::Ppm;
+        let warnings = [
+            (is_paper && chooses).then_some(Self::KeptChoices),
+            (!is_paper && specular && photon_maps == 1).then_some(Self::OneMap),
+        ];
+        warnings.into_iter().flatten().collect()
+    }
+
+    /// Of what happened in a render of so many photon paths.
+    pub fn of(counters: &Counters, emitted: u64, max_depth: u32) -> Vec<Self> {
+        let warnings = [
+            (counters.truncated_paths > 0).then_some(Self::Truncated {
+                paths: counters.truncated_paths,
+                emitted,
+                max_depth,
+            }),
+            (counters.cut_paths > 0).then_some(Self::Cut {
+                paths: counters.cut_paths,
+                emitted,
+            }),
+            (counters.lost_photons > 0).then_some(Self::Lost {
+                photons: counters.lost_photons,
+                stored: counters.photons_stored,
+                cells: counters.full_cells,
+            }),
+            (counters.non_finite > 0).then_some(Self::NonFinite {
+                values: counters.non_finite,
+            }),
+        ];
+        warnings.into_iter().flatten().collect()
+    }
+
+    /// Whether hardly anything of the picture is missing.
+    pub fn is_slight(&self) -> bool {
+        match self {
+            Self::OneMap => true,
+            // From bounce to bounce about the same share goes on, so that the paths that were cut had about as much before them as
+            // all had at their start: as if all were photon paths, that is their share of the light.
+            Self::Truncated { paths, emitted, .. } => share(*paths, *emitted) < TELLING_SHARE,
+            _ => false,
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::KeptChoices => text.write_str(
+                "the estimator ppm finds visible points once: where a wavelength, alpha, a coat, a part of the light or a place on a \
+                 lamp is chosen by chance, each pixel keeps its first choice, and the picture stays grainy there, however long it \
+                 renders",
+            ),
+            Self::OneMap => text.write_str(
+                "caustics have the radii of other light: at this resolution a photon map of their own is larger than the device binds",
+            ),
+            Self::Truncated { paths, max_depth, .. } if self.is_slight() => write!(
+                text,
+                "{paths} paths ended at the limit of {max_depth} bounces: less than {} of the light",
+                percent(TELLING_SHARE)
+            ),
+            Self::Truncated {
+                paths,
+                emitted,
+                max_depth,
+            } => write!(
+                text,
+                "{paths} camera and photon paths reached the limit of {max_depth} bounces, {} of {emitted} photon paths; about that \
+                 share of the light is missing, more where all is seen by many bounces",
+                percent(share(paths, emitted))
+            ),
+            Self::Cut { paths, emitted } => write!(
+                text,
+                "{paths} paths were ended by the driver's loop limit, {} of {emitted} photon paths; about that share of the light is \
+                 missing",
+                percent(share(paths, emitted))
+            ),
+            Self::Lost { photons, stored, cells } => write!(
+                text,
+                "{photons} of {stored} photons, {}, were beyond the maximum of {cells} grid cells; that share of the light that \
+                 photons bring is missing",
+                percent(share(photons, stored))
+            ),
+            Self::NonFinite { values } => write!(
+                text,
+                "{values} values were NaN or infinite and count as black: a light or a texture of this scene is brighter than numbers \
+                 reach (10^38), or so small that they end"
+            ),
+            Self::Black => text.write_str(
+                "the picture is black: no light has come to what the camera sees; is there a light that shines there, and nothing \
+                 before the camera?",
+            ),
+        }
+    }
+}
+
+fn share(part: u64, whole: u64) -> f64 {
+    part as f64 / whole.max(1) as f64
+}
+
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent < 0.1 {
+        format!("{percent:.1e} %")
+    } else {
+        format!("{percent:.1} %")
+    }
+}

@@ -1,0 +1,309 @@
+//! The iterations of a render, until they end or one fails.
+
+use std::time::{Duration, Instant};
+
+use super::{Failure, Hooks, Progress, Until};
+use crate::backend::{Backend, Resolved};
+use crate::error::{Error, Result};
+use crate::estimate::ErrorEstimate;
+use crate::report::Profile;
+
+/// A picture is kept, for the case that a later iteration loses the device, so often that this is the part of the time that it
+/// takes.
+const KEEPING: f64 = 0.01;
+
+/// What there is to be done.
+pub struct Work<'a> {
+    /// When it ends.
+    pub until: Until,
+    /// How its error is told.
+    pub estimate: ErrorEstimate,
+    /// Who waits for it.
+    pub hooks: &'a Hooks<'a>,
+}
+
+/// What was rendered.
+pub struct Done {
+    /// The picture.
+    pub picture: Resolved,
+    /// Iterations in it.
+    pub iterations: u32,
+    /// Photon paths in it.
+    pub emitted: u64,
+    /// Seconds that it took.
+    pub seconds: f64,
+    /// Time until the end, with iterations that aren't in it.
+    pub time: Duration,
+    /// Launches of all iterations.
+    pub profile: Profile,
+    /// What ended the render too early.
+    pub failure: Option<Failure>,
+}
+
+/// A picture on the way.
+struct Kept {
+    picture: Resolved,
+    iterations: u32,
+    emitted: u64,
+    /// Rendering time in seconds.
+    seconds: f64,
+    at: Instant,
+    /// Time that it took to be made.
+    cost: Duration,
+}
+
+impl Kept {
+    /// The picture so far of a render that began at `start`.
+    fn make(backend: &mut dyn Backend, start: Instant) -> Result<Self> {
+        let begin = Instant::now();
+        let picture = backend.resolve_all()?;
+        Ok(Self {
+            picture,
+            iterations: backend.iterations(),
+            emitted: backend.emitted(),
+            seconds: (begin - start).as_secs_f64(),
+            at: Instant::now(),
+            cost: begin.elapsed(),
+        })
+    }
+
+    fn is_old(&self) -> bool {
+        self.at.elapsed().as_secs_f64() * KEEPING > self.cost.as_secs_f64()
+    }
+}
+
+impl Work<'_> {
+    /// Renders.
+    ///
+    /// # Errors
+    /// What failed before there was a picture. Later failures are told beside the picture of the iterations before.
+    pub fn run(&self, backend: &mut dyn Backend) -> Result<Done> {
+        let start = Instant::now();
+        let asked = self.hooks.stop;
+        let done = |backend: &dyn Backend, error| self.until.done(backend.iterations(), start.elapsed(), error);
+        let stop = || asked() || self.until.time.is_some_and(|time| start.elapsed() >= time);
+        let mut profile = Profile::default();
+        let mut kept: Option<Kept> = None;
+        let mut error = None;
+        let mut failure = None;
+        let mut has_begun = false;
+        // However short the time, there is a picture; and what the device was given ahead is waited for.
+        while backend.iterations() == 0 || has_begun || !(asked() || done(backend, error) >= 1.0) {
+            let began = start.elapsed();
+            let next = backend.iterations() + 1;
+            let is_due = ErrorEstimate::is_due(next);
+            let is_last = self.until.iterations.is_some_and(|most| next >= most);
+            let another = !(is_due || is_last || stop() || kept.as_ref().is_none_or(Kept::is_old));
+            has_begun = another;
+            let run = if another {
+                backend.iterate_before_another(&stop)
+            } else {
+                backend.iterate_unless(&stop)
+            };
+            let run = run.and_then(|run| {
+                let iterations = backend.iterations();
+                if run.is_some() && !another && (is_due || kept.as_ref().is_none_or(Kept::is_old)) {
+                    let made = Kept::make(backend, start)?;
+                    if is_due {
+                        error = self
+                            .estimate
+                            .relative(iterations, &made.picture)
+                            .map(|error| error.total);
+                    }
+                    kept = Some(made);
+                }
+                Ok(run)
+            });
+            match run {
+                Ok(Some(run)) if self.hooks.profile => profile.add(began, run),
+                Ok(Some(_)) => {}
+                Ok(None) => break,
+                Err(error) => {
+                    failure = Some(error);
+                    break;
+                }
+            }
+            (self.hooks.progress)(Progress {
+                iterations: backend.iterations(),
+                photons_emitted: backend.emitted(),
+                error,
+                done: done(backend, error),
+            });
+        }
+        let at_end = if kept
+            .as_ref()
+            .is_some_and(|kept| kept.iterations == backend.iterations())
+        {
+            Ok(())
+        } else {
+            Kept::make(backend, start).map(|made| kept = Some(made))
+        };
+        let failure = failure.or(at_end.err());
+        let Some(kept) = kept.filter(|kept| kept.iterations > 0) else {
+            return Err(failure.unwrap_or_else(|| Error::Device("no iteration was done".to_owned())));
+        };
+        let failure = failure.map(|error| Failure {
+            error,
+            iteration: backend.iterations() + 1,
+            kept: kept.iterations,
+        });
+        Ok(Done {
+            picture: kept.picture,
+            iterations: kept.iterations,
+            emitted: kept.emitted,
+            seconds: kept.seconds,
+            time: start.elapsed(),
+            profile,
+            failure,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::{Counters, DeviceDescription};
+    use crate::config::RenderConfig;
+    use crate::estimate::OnePhoton;
+    use crate::layout::BehindGlass;
+    use crate::record::Run;
+    use bytemuck::Zeroable as _;
+
+    /// A device that is lost in an iteration, and whose pictures are as bright as it has done iterations.
+    struct Lost {
+        iterations: u32,
+        lost_in: u32,
+        is_lost: bool,
+        /// Whether its memory can still be read.
+        is_readable: bool,
+    }
+
+    fn lost_in(iteration: u32, is_readable: bool) -> Lost {
+        Lost {
+            iterations: 0,
+            lost_in: iteration,
+            is_lost: false,
+            is_readable,
+        }
+    }
+
+    impl Backend for Lost {
+        fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
+            if self.iterations + 1 == self.lost_in {
+                self.is_lost = true;
+                return Err(Error::Device("the device is lost".to_owned()));
+            }
+            if self.iterations > 0 && stop() {
+                return Ok(None);
+            }
+            self.iterations += 1;
+            Ok(Some(Run::default()))
+        }
+
+        fn resolve_all(&mut self) -> Result<Resolved> {
+            if self.is_lost && !self.is_readable {
+                return Err(Error::Device("the device is lost".to_owned()));
+            }
+            let pixel = [self.iterations as f32; 4];
+            Ok(Resolved::from_film(
+                [1, 1],
+                &[pixel],
+                vec![BehindGlass::zeroed()],
+                vec![pixel; 4],
+            ))
+        }
+
+        fn iterations(&self) -> u32 {
+            self.iterations
+        }
+
+        fn emitted(&self) -> u64 {
+            10 * u64::from(self.iterations)
+        }
+
+        fn counters(&self) -> Counters {
+            Counters::default()
+        }
+
+        fn radius(&self) -> f32 {
+            1.0
+        }
+
+        fn photon_flux(&self) -> Option<f64> {
+            None
+        }
+
+        fn aims(&self) -> bool {
+            false
+        }
+
+        fn photon_maps(&self) -> u32 {
+            1
+        }
+
+        fn device(&self) -> DeviceDescription {
+            DeviceDescription {
+                name: String::new(),
+                driver: String::new(),
+                timestamp_period_ns: 1.0,
+            }
+        }
+    }
+
+    fn run(device: &mut Lost, until: Until, stop: &dyn Fn() -> bool) -> Result<Done> {
+        let hooks = Hooks {
+            stop,
+            ..Hooks::default()
+        };
+        let work = Work {
+            until,
+            estimate: ErrorEstimate::new(&RenderConfig::default(), OnePhoton::default()),
+            hooks: &hooks,
+        };
+        work.run(device)
+    }
+
+    fn twenty(device: &mut Lost) -> Result<Done> {
+        run(device, Until::iterations(20), &|| false)
+    }
+
+    #[test]
+    fn an_iteration_that_fails_leaves_the_picture_of_those_before() {
+        for is_readable in [true, false] {
+            let done =
+                twenty(&mut lost_in(9, is_readable)).unwrap_or_else(|error| panic!("readable: {is_readable}: {error}"));
+            assert_eq!((done.iterations, done.emitted), (8, 80));
+            assert_eq!(done.picture.image.pixels(), [[8.0; 3]]);
+            let failure = done.failure.expect("what failed");
+            assert_eq!((failure.iteration, failure.kept), (9, 8));
+            let text = failure.to_string();
+            assert!(
+                text.contains("the device is lost") && text.contains("iteration 9") && text.contains("first 8"),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_picture_is_kept_from_the_first_iteration_on() {
+        assert_eq!(twenty(&mut lost_in(2, false)).expect("a picture").iterations, 1);
+        let error = twenty(&mut lost_in(1, false)).err().expect("an error").to_string();
+        assert!(error.contains("the device is lost"), "{error}");
+    }
+
+    #[test]
+    fn one_iteration_is_done_however_soon_the_user_asks_to_stop() {
+        let done = run(&mut lost_in(9, true), Until::iterations(20), &|| true);
+        assert_eq!(done.expect("a picture").iterations, 1);
+        let done = run(&mut lost_in(9, true), Until::time(Duration::from_nanos(1)), &|| false);
+        assert_eq!(done.expect("a picture").iterations, 1);
+    }
+
+    #[test]
+    fn a_render_goes_on_where_it_ended() {
+        let mut device = lost_in(u32::MAX, true);
+        assert_eq!(twenty(&mut device).expect("a picture").iterations, 20);
+        let more = run(&mut device, Until::iterations(23), &|| false).expect("a picture");
+        assert_eq!((more.iterations, device.iterations), (23, 23));
+    }
+}
