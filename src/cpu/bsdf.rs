@@ -292,3 +292,6 @@ pub fn choose(branches: &[Branch], u: f64) -> Option<Branch> {
     });
     chosen.or(branches.last()).copied()
 }
+
+#[cfg(test)]
+mod tests;

@@ -2,7 +2,7 @@
 //! else of how light is followed.
 
 use ppm_vk::internals::backend::Backend;
-use ppm_vk::internals::config::{Direct, Estimator, RenderConfig, SEQUENCES};
+use ppm_vk::internals::config::{Direct, EmissionChoice, Estimator, RenderConfig, SEQUENCES};
 
 use super::bench::{Bench, small};
 
@@ -97,6 +97,7 @@ fn both_renderers_converge_to_the_same_picture() {
             let config = RenderConfig {
                 estimator,
                 direct,
+                emission: EmissionChoice::of(estimator),
                 resolution: [SIDE; 2],
                 photons: 10_000,
                 radius: Some(0.05),
