@@ -136,10 +136,12 @@ fn no_picture_has_values_that_are_no_numbers() {
         let image = read_exr(&folder.path().join("o.exr")).expect("a picture");
         assert_eq!(defects(&image), Defects::default(), "{backend}: {said:#?}");
         let warnings = warnings(&said);
+        // In f64 sums reach farther than the picture's numbers, which hold all of this one.
         assert!(
-            warnings.len() == 1
-                && warnings[0].contains("count as black")
-                && warnings[0].contains("scale its lights down"),
+            (warnings.is_empty() && backend == "cpu")
+                || warnings.len() == 1
+                    && warnings[0].contains("count as black")
+                    && warnings[0].contains("scale its lights down"),
             "{backend}: {said:#?}"
         );
     }

@@ -131,10 +131,13 @@ fn a_pane_reflects_as_one_and_two_panes_as_two() {
             // Faces in one place are one pane (docs/files.md).
             _ => (once, 0.0),
         };
-        // Panes in one place have no noise; others need their samples, and have nothing to agree on.
+        // Panes in one place have no noise by kernels; others need their samples, and have nothing to agree on. The plain renderer
+        // chooses by chance what a pane mirrors: 16,384 paths, of which four in a hundred see the wall.
         for way in &WAYS[..if deviation == 0.0 { WAYS.len() } else { 1 }] {
             let seen = render(&scene, 16, 8, 2000, way);
             // Away from the middle the angle is up to 8°, where 0.1 % more are reflected.
+            let by_chance = 10.0 * (once * (1.0 - once) / 16_384.0).sqrt();
+            let deviation = if way.contains(&"cpu") { by_chance } else { deviation };
             let tolerance = 5.0 * deviation + 0.001 * 10.0 * expected;
             seen.assert_mean(10.0 * expected, tolerance, &format!("{way:?}"), all);
         }
