@@ -30,7 +30,7 @@ fn blocks(pixels: &[[f32; 4]]) -> Vec<f64> {
 
 /// Of a render, the pictures of its sequences, which are independent of each other unless their visible points are the same.
 fn samples(renderer: &mut dyn Backend, estimator: Estimator) -> Vec<Vec<f64>> {
-    while renderer.iterations() < 16 {
+    while renderer.iterations() < 8 {
         renderer.iterate().expect("an iteration");
     }
     let resolved = renderer.resolve_all().expect("a picture");
