@@ -59,7 +59,12 @@ fn main() -> Result<()> {
         fs::write(out.join(format!("{name}.spv")), optimised.as_binary_u8())?;
         let entry_point = reflect(named.as_binary(), false).with_context(|| source.display().to_string())?;
         check_bindings(optimised.as_binary(), &entry_point).with_context(|| source.display().to_string())?;
-        describe(&mut module, &name, &entry_point).with_context(|| source.display().to_string())?;
+        let by_query = with_ray_query(&compiler, &text, &file, &root)?;
+        if let Some(module) = &by_query {
+            check_bindings(module.as_binary(), &entry_point).with_context(|| format!("{file} with ray queries"))?;
+            fs::write(out.join(format!("{name}.ray_query.spv")), module.as_binary_u8())?;
+        }
+        describe(&mut module, &name, &entry_point, by_query.is_some()).with_context(|| source.display().to_string())?;
         names.push(name.to_uppercase());
     }
     writeln!(
@@ -92,12 +97,34 @@ fn compile(
     root: &Path,
     level: shaderc::OptimizationLevel,
 ) -> Result<shaderc::CompilationArtifact> {
+    let options = options(root, level)?;
+    Ok(compiler.compile_into_spirv(text, shaderc::ShaderKind::Compute, file, "main", Some(&options))?)
+}
+
+/// The stage with rays that the device traces itself, if it traces any: a module that other devices can't load.
+fn with_ray_query(
+    compiler: &shaderc::Compiler,
+    text: &str,
+    file: &str,
+    root: &Path,
+) -> Result<Option<shaderc::CompilationArtifact>> {
+    let level = shaderc::OptimizationLevel::Performance;
+    let (version, rest) = text.split_once('\n').context("an empty stage")?;
+    let text = format!("{version}\n#extension GL_EXT_ray_query : require\n#define RAY_QUERY\n#line 2\n{rest}");
+    let preprocessed = compiler.preprocess(&text, file, "main", Some(&options(root, level)?))?;
+    if !preprocessed.as_text().contains("rayQueryInitializeEXT") {
+        return Ok(None);
+    }
+    compile(compiler, &text, file, root, level).map(Some)
+}
+
+fn options(root: &Path, level: shaderc::OptimizationLevel) -> Result<shaderc::CompileOptions<'_>> {
     let mut options = shaderc::CompileOptions::new().context("shaderc: no options")?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
     options.set_optimization_level(level);
     options.set_auto_bind_uniforms(true);
     options.set_warnings_as_errors();
-    options.set_include_callback(|name, _, _, _| {
+    options.set_include_callback(move |name, _, _, _| {
         let path = root.join("glsl").join(name);
         let content = match layout::include(name) {
             Some(generated) => generated,
@@ -108,7 +135,7 @@ fn compile(
             content,
         })
     });
-    Ok(compiler.compile_into_spirv(text, shaderc::ShaderKind::Compute, file, "main", Some(&options))?)
+    Ok(options)
 }
 
 /// `unused`: also what the kernel declares and doesn't use.
@@ -155,7 +182,7 @@ fn check_bindings(spirv: &[u32], entry_point: &EntryPoint) -> Result<()> {
 }
 
 /// Appends the `Shader` constant of the stage `name` to the module.
-fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result<()> {
+fn describe(module: &mut String, name: &str, entry_point: &EntryPoint, by_query: bool) -> Result<()> {
     let mut bindings = BTreeMap::new();
     let mut constants = BTreeMap::new();
     let mut push_constants = "None".to_owned();
@@ -210,10 +237,15 @@ fn describe(module: &mut String, name: &str, entry_point: &EntryPoint) -> Result
         .map(|(id, name)| format!("SpecConstant {{ id: {id}, name: \"{name}\" }}"))
         .collect();
     let bindings: Vec<String> = bindings.into_values().collect();
+    let ray_query = if by_query {
+        format!("Some(include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.ray_query.spv\")))")
+    } else {
+        "None".to_owned()
+    };
     writeln!(
         module,
         "/// Stage `{name}`.\npub static {}: Shader = Shader {{ name: \"{name}\", \
-         spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")), \
+         spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")), ray_query: {ray_query}, \
          workgroup: {}, bindings: &[{}], push_constants: {push_constants}, constants: &[{}] }};",
         name.to_uppercase(),
         workgroup_size(entry_point)?,

@@ -39,8 +39,12 @@ choices! {
 choices! {
     /// How rays meet triangles.
     pub enum Accel {
+        /// `ray-query` on a GPU that has it, `bvh` elsewhere.
+        Auto => "auto",
         /// A bounding volume hierarchy.
         Bvh => "bvh",
+        /// The device's own ray tracing (VK_KHR_ray_query).
+        RayQuery => "ray-query",
         /// Every triangle, as in the paper.
         Brute => "brute",
     }
@@ -172,7 +176,7 @@ impl RenderConfig {
         radius: None,
         gather: None,
         cell_photons: None,
-        accel: Accel::Bvh,
+        accel: Accel::Auto,
         triangle_test: TriangleTest::Watertight,
         max_depth: 64,
         drop_unwanted: true,

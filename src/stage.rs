@@ -265,6 +265,10 @@ pub struct SpecConstant {
     pub name: &'static str,
 }
 
+/// The constant that chooses [`Shader::ray_query`]. It is none of the shader's own, since it can't be one: a device without ray
+/// queries can't load the module that has them.
+pub const RAY_QUERY: &str = "RAY_QUERY";
+
 /// A compiled stage, as `build.rs` describes it.
 #[derive(Debug)]
 pub struct Shader {
@@ -272,6 +276,8 @@ pub struct Shader {
     pub name: &'static str,
     /// SPIR-V, little endian.
     pub spirv: &'static [u8],
+    /// The same with rays that the device traces itself, where the stage traces any: see [`RAY_QUERY`].
+    pub ray_query: Option<&'static [u8]>,
     /// Invocations of a workgroup.
     pub workgroup: u32,
     /// What it binds.
@@ -315,6 +321,15 @@ impl StageDesc {
             push: Vec::new(),
             bound: Cow::Borrowed(&[]),
         }
+    }
+
+    /// The module with rays that the device traces itself, if that is the one to run.
+    pub fn ray_query(&self) -> Option<&'static [u8]> {
+        let asked = self
+            .constants
+            .iter()
+            .any(|&(name, value)| name == RAY_QUERY && value != 0);
+        self.shader.ray_query.filter(|_| asked)
     }
 
     /// With these push constants.

@@ -44,12 +44,17 @@ fn figure(kernel: &Value, name: &str) -> u64 {
 }
 
 /// Asserts that no kernel spills registers, and that enough subgroups of each fit a SIMD at once: memory's latency is hidden by as
-/// many.
-fn assert_fit(features: &str, least: u64) {
+/// many. Where the device traces rays itself, its driver's traversal is a part of the kernel.
+fn assert_fit(features: &str, least: u64, least_by_query: u64) {
     let Some(kernels) = compiled(features) else { return };
     assert!(kernels.len() > 30, "{features}: {} kernels", kernels.len());
     for kernel in &kernels {
-        let stage = kernel["stage"].as_str().expect("a stage");
+        let mut stage = kernel["stage"].as_str().expect("a stage").to_owned();
+        let by_query = kernel["ray_query"] == true;
+        if by_query {
+            stage += " by ray query";
+        }
+        let least = if by_query { least_by_query } else { least };
         let spills = figure(kernel, "Spilled VGPRs");
         assert_eq!(spills, 0, "{stage} with {features}: spilled registers");
         let registers = figure(kernel, "VGPRs");
@@ -63,16 +68,16 @@ fn assert_fit(features: &str, least: u64) {
 
 #[test]
 fn kernels_that_know_no_feature_fit_twelve_times() {
-    assert_fit("none", 12);
+    assert_fit("none", 12, 8);
 }
 
 #[test]
 fn kernels_of_usual_scenes_fit_twelve_times() {
-    assert_fit("mirrors,dielectrics,glossy,textured", 12);
+    assert_fit("mirrors,dielectrics,glossy,textured", 12, 8);
 }
 
 /// No scene has everything.
 #[test]
 fn kernels_that_know_everything_fit_eight_times() {
-    assert_fit("all", 8);
+    assert_fit("all", 8, 8);
 }

@@ -7,7 +7,7 @@ mod picture;
 use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::{Accel, Direct, EmissionChoice, RenderConfig};
 use ppm_vk::internals::gather;
-use ppm_vk::internals::gpu::Device;
+use ppm_vk::internals::gpu::{Device, best_device};
 use ppm_vk::internals::metrics::{Defects, compare, defects};
 use ppm_vk::internals::packing::SceneFeatures;
 
@@ -104,20 +104,20 @@ fn every_gather_method_gives_the_same_picture() {
 }
 
 #[test]
-fn rays_meet_the_same_triangles_with_and_without_the_hierarchy() {
-    let config = small(32, 2000);
-    let with = Subject::named("cornell").render(2, config.clone());
-    let without = Subject::named("cornell").render(
-        2,
-        RenderConfig {
-            accel: Accel::Brute,
-            ..config
-        },
-    );
-    assert!(
-        compare(&without, &with).expect("sizes").rel_mse < 1e-9,
-        "the BVH loses or adds hits"
-    );
+fn rays_meet_the_same_triangles_by_every_search() {
+    let by = |accel| {
+        let config = small(32, 2000);
+        Subject::named("cornell").render(2, RenderConfig { accel, ..config })
+    };
+    let device = best_device().expect("a device");
+    let others = [Accel::Brute, Accel::RayQuery];
+    for accel in others.into_iter().take(if device.ray_query { 2 } else { 1 }) {
+        let difference = compare(&by(accel), &by(Accel::Bvh)).expect("sizes").rel_mse;
+        assert!(
+            difference < 1e-9,
+            "{accel:?} loses or adds hits: {difference} from the BVH's picture"
+        );
+    }
 }
 
 #[test]

@@ -290,6 +290,10 @@ Hit trace_all(Ray ray, Progress progress, float limit, PlacedTriangle ignored, b
     return hit;
 }
 
+#ifdef RAY_QUERY
+#include "trace/ray_query.glsl"
+#endif
+
 // As `trace_from`, by the hierarchy.
 Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
     Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
@@ -379,7 +383,11 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
     if (BRUTE_FORCE) {
         hit = trace_all(ray, progress, limit, ignored, any_hit);
     } else {
+#ifdef RAY_QUERY
+        hit = trace_by_query(ray, progress, limit, ignored, any_hit);
+#else
         hit = trace_hierarchy(ray, progress, limit, ignored, any_hit);
+#endif
     }
     return hit;
 }

@@ -9,7 +9,7 @@ use ppm_vk::internals::gpu::Compiler;
 use ppm_vk::internals::packing::SceneFeatures;
 use ppm_vk::internals::shaders;
 use ppm_vk::internals::sizes::clustered_run;
-use ppm_vk::internals::stage::{Shader, StageDesc};
+use ppm_vk::internals::stage::{RAY_QUERY, Shader, StageDesc};
 
 /// Kernels compiled for one set of features.
 #[derive(Debug, Clone, Serialize)]
@@ -27,6 +27,8 @@ pub struct CompiledKernels {
 pub struct CompiledKernel {
     /// Its stage.
     pub stage: &'static str,
+    /// Whether it has rays traced by the device itself: stages that trace are there twice where it does.
+    pub ray_query: bool,
     /// The driver's figures by its names, in its order.
     pub statistics: Vec<(String, f64)>,
 }
@@ -48,14 +50,24 @@ pub fn compiled_kernels(device: Option<&str>, features: SceneFeatures) -> Result
     let run = clustered_run(compiler.summary().kind);
     let mut constants = vec![("AIMED", 1), ("ASKS_BEHIND_GLASS", 0), ("RUN", run)];
     constants.extend(features.constants().map(|(name, present)| (name, u32::from(present))));
-    let mut compile = |shader: &&'static Shader| {
-        let stage = StageDesc::new(shader, 1).constants(constants.clone());
+    let by_query = compiler.summary().ray_query;
+    let mut compile = |shader: &'static Shader, ray_query: bool| {
+        let stage = StageDesc::new(shader, 1)
+            .constants(constants.clone())
+            .constant(RAY_QUERY, u32::from(ray_query));
         Ok(CompiledKernel {
             stage: shader.name,
+            ray_query,
             statistics: compiler.statistics(&stage)?,
         })
     };
-    let kernels = shaders::ALL.iter().map(&mut compile).collect::<Result<_>>()?;
+    let mut kernels = Vec::new();
+    for shader in shaders::ALL {
+        kernels.push(compile(shader, false)?);
+        if by_query && shader.ray_query.is_some() {
+            kernels.push(compile(shader, true)?);
+        }
+    }
     let summary = compiler.summary();
     Ok(CompiledKernels {
         device: format!("{} ({})", summary.name, summary.driver),
@@ -89,7 +101,12 @@ pub fn kernels_table(compiled: &CompiledKernels) -> String {
     }
     text.push('\n');
     for kernel in &compiled.kernels {
-        let _ = write!(text, "{:<22}", kernel.stage);
+        let name = if kernel.ray_query {
+            format!("{}, ray query", kernel.stage)
+        } else {
+            kernel.stage.to_owned()
+        };
+        let _ = write!(text, "{name:<22}");
         for name in &names {
             let value = kernel.get(name).map_or("-".to_owned(), |value| format!("{value}"));
             let _ = write!(text, " {value:>width$}", width = name.len().max(8));

@@ -143,7 +143,7 @@ impl<'a> Search<'a> {
                     self.test(first..first + instance.triangle_count, Some(index));
                 }
             }
-            Accel::Bvh => self.traverse(&self.scene.bvh, 0, None),
+            Accel::Auto | Accel::Bvh | Accel::RayQuery => self.traverse(&self.scene.bvh, 0, None),
         }
         self.hit
     }

@@ -28,6 +28,16 @@ impl Buffer {
             }
             _ => vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST,
         };
+        Self::with_usage(context, name, bytes, location, usage)
+    }
+
+    pub fn with_usage(
+        context: &Context,
+        name: &str,
+        bytes: u64,
+        location: MemoryLocation,
+        usage: vk::BufferUsageFlags,
+    ) -> Result<Self> {
         let create = vk::BufferCreateInfo::default().size(bytes.max(4)).usage(usage);
         // SAFETY: the context outlives the buffer: Device frees its buffers before the context.
         unsafe {

@@ -9,6 +9,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 use serde::Serialize;
 
+use super::ray_tracing::{self, RayTracing};
 use crate::error::{Error, Remedy, Result};
 use crate::shaders;
 
@@ -54,6 +55,8 @@ pub struct DeviceSummary {
     pub max_shared_memory_bytes: u32,
     /// Bytes that can be allocated at once.
     pub max_allocation_bytes: u64,
+    /// Whether it traces rays by itself (VK_KHR_ray_query).
+    pub ray_query: bool,
     /// What the device lacks to run the program; empty if nothing.
     pub lacks: Vec<String>,
 }
@@ -275,6 +278,7 @@ impl Instance {
             max_texels: limits.max_texel_buffer_elements,
             max_shared_memory_bytes: limits.max_compute_shared_memory_size,
             max_allocation_bytes: maintenance.max_memory_allocation_size,
+            ray_query: lacks.is_empty() && self.traces_rays(device),
             lacks,
         }
     }
@@ -285,6 +289,12 @@ impl Instance {
             &self.extensions(device)?,
             khr::pipeline_executable_properties::NAME,
         ))
+    }
+
+    /// Whether a device traces rays by itself.
+    fn traces_rays(&self, device: vk::PhysicalDevice) -> bool {
+        let found = self.extensions(device).unwrap_or_default();
+        ray_tracing::EXTENSIONS.iter().all(|name| has(&found, name)) && ray_tracing::has_features(&self.handle, device)
     }
 
     fn extensions(&self, device: vk::PhysicalDevice) -> Result<Vec<vk::ExtensionProperties>> {
@@ -333,6 +343,8 @@ pub(super) struct Context {
     pub family: u32,
     pub timestamp_bits: u32,
     debug: Option<ext::debug_utils::Device>,
+    /// Where the device traces rays by itself.
+    pub ray_tracing: Option<RayTracing>,
     /// Whether kernels are only compiled. A device that isn't there can't be waited for.
     compiles_only: bool,
     pub instance: Arc<Instance>,
@@ -358,7 +370,19 @@ impl Context {
             }
             let mut of_executables =
                 vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+            let traces_rays = instance.traces_rays(physical);
+            let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
+            let mut structures =
+                vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+            let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
             let mut create = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+            if traces_rays {
+                names.extend(ray_tracing::EXTENSIONS.map(CStr::as_ptr));
+                create = create
+                    .push_next(&mut addresses)
+                    .push_next(&mut structures)
+                    .push_next(&mut queries);
+            }
             if compiles_only {
                 names.push(khr::pipeline_executable_properties::NAME.as_ptr());
                 create = create.push_next(&mut of_executables);
@@ -377,10 +401,15 @@ impl Context {
                 device: device.clone(),
                 physical_device: physical,
                 debug_settings: AllocatorDebugSettings::default(),
-                buffer_device_address: false,
+                buffer_device_address: traces_rays,
                 allocation_sizes: AllocationSizes::default(),
             })
             .map_err(|error| Error::Device(format!("no allocator: {error}")))?;
+            let ray_tracing = if traces_rays {
+                Some(RayTracing::new(&instance.handle, physical, &device)?)
+            } else {
+                None
+            };
             Ok(Self {
                 allocator: ManuallyDrop::new(Mutex::new(allocator)),
                 device,
@@ -388,6 +417,7 @@ impl Context {
                 family,
                 timestamp_bits,
                 debug,
+                ray_tracing,
                 compiles_only,
                 instance,
             })
@@ -438,6 +468,9 @@ impl Drop for Context {
         unsafe {
             if !self.compiles_only {
                 let _ = self.device.device_wait_idle();
+            }
+            if let Some(ray_tracing) = &self.ray_tracing {
+                ray_tracing.free(&self.device);
             }
             ManuallyDrop::drop(&mut self.allocator);
             self.device.destroy_device(None);

@@ -10,6 +10,7 @@ use super::context::{Context, DeviceSummary, Instance};
 use super::descriptors::Descriptors;
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
+use super::ray_tracing::Acceleration;
 use super::submission::Slots;
 use crate::error::{Error, Remedy, Result};
 use crate::stage::BufferId;
@@ -42,6 +43,7 @@ pub struct Device {
     pub(super) buffers: HashMap<BufferId, Buffer>,
     pub(super) pipelines: Pipelines,
     pub(super) descriptors: Descriptors,
+    pub(super) acceleration: Option<Acceleration>,
     pub(super) slots: Slots,
     /// Nanoseconds that an invocation of each stage took when it last ran.
     pub(super) thread_ns: HashMap<&'static str, f64>,
@@ -69,6 +71,7 @@ impl Device {
             buffers: HashMap::new(),
             pipelines: Pipelines::new(cache, vk::PipelineCreateFlags::empty()),
             descriptors: Descriptors::default(),
+            acceleration: None,
             slots,
             thread_ns: HashMap::new(),
             context,
@@ -252,6 +255,9 @@ impl Drop for Device {
         self.slots.free(&self.context);
         self.descriptors.free(&self.context);
         self.pipelines.free(&self.context);
+        if let Some(acceleration) = self.acceleration.take() {
+            acceleration.free(&self.context);
+        }
         for (_, buffer) in self.buffers.drain() {
             buffer.free(&self.context);
         }
@@ -275,6 +281,7 @@ mod tests {
             max_texels: 1 << 16,
             max_shared_memory_bytes: 1 << 14,
             max_allocation_bytes: 1 << 30,
+            ray_query: false,
             lacks: lacks.iter().map(|&what| what.to_owned()).collect(),
         };
         (vk::PhysicalDevice::null(), summary)

@@ -20,6 +20,9 @@ const MOST_NS: f64 = 100e6;
 #[must_use]
 pub struct Ticket(usize);
 
+/// A launch's pipeline and its descriptor sets.
+type Bound = (Pipeline, Vec<vk::DescriptorSet>);
+
 /// What a recording took, and what it read back.
 pub struct Done {
     /// Its launches.
@@ -71,7 +74,19 @@ impl Device {
             pipelines.push(self.pipelines.get(&self.context, stage)?);
         }
         let sets = self.sets(&stages, &pipelines)?;
-        let bound: Vec<(Pipeline, vk::DescriptorSet)> = pipelines.into_iter().zip(sets).collect();
+        let for_rays = self.acceleration.as_ref().map(|acceleration| acceleration.set);
+        if for_rays.is_none() && pipelines.iter().any(|pipeline| pipeline.ray_query) {
+            let message = "a stage traces rays before there is anything to trace them through";
+            return Err(Error::Device(message.to_owned()));
+        }
+        let bound: Vec<Bound> = pipelines
+            .into_iter()
+            .zip(sets)
+            .map(|(pipeline, set)| {
+                let for_rays = for_rays.filter(|_| pipeline.ray_query);
+                (pipeline, [set].into_iter().chain(for_rays).collect())
+            })
+            .collect();
         let index = self.idle_slot()?;
         let mut reads = Vec::new();
         for command in commands {
@@ -112,13 +127,7 @@ impl Device {
         Ok(Ticket(index))
     }
 
-    fn record(
-        &mut self,
-        slot: usize,
-        commands: &[Command],
-        parts: &[Vec<Piece>],
-        bound: &[(Pipeline, vk::DescriptorSet)],
-    ) -> Result<()> {
+    fn record(&mut self, slot: usize, commands: &[Command], parts: &[Vec<Piece>], bound: &[Bound]) -> Result<()> {
         let handles: Vec<vk::Buffer> = commands
             .iter()
             .map(|command| match command {
@@ -145,7 +154,7 @@ impl Device {
                     let i = piece.index;
                     match &commands[i] {
                         Command::Dispatch(stage) => {
-                            dispatch(context, into, (stage, *piece), bound[launch], (queries, query));
+                            dispatch(context, into, (stage, *piece), &bound[launch], (queries, query));
                             query += 2;
                             launch += usize::from(piece.place + 1 == piece.count);
                         }
@@ -288,7 +297,7 @@ fn dispatch(
     context: &Context,
     commands: vk::CommandBuffer,
     (stage, piece): (&StageDesc, Piece),
-    (pipeline, set): (Pipeline, vk::DescriptorSet),
+    (pipeline, sets): &Bound,
     (queries, query): (vk::QueryPool, u32),
 ) {
     let device = &context.device;
@@ -297,7 +306,7 @@ fn dispatch(
     // SAFETY: the command buffer is recording; the caller keeps what it is given until the work has been waited for.
     unsafe {
         device.cmd_bind_pipeline(commands, compute, pipeline.handle);
-        device.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
+        device.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, sets, &[]);
         if !stage.push.is_empty() {
             let flags = vk::ShaderStageFlags::COMPUTE;
             device.cmd_push_constants(commands, pipeline.layout, flags, 0, &stage.push);

@@ -9,6 +9,7 @@ mod device;
 mod execute;
 mod pipeline;
 mod pipeline_cache;
+mod ray_tracing;
 mod self_check;
 mod statistics;
 mod submission;

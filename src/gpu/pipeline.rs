@@ -1,11 +1,13 @@
 //! Compute pipelines, one for each shader and set of specialisation constants.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use ash::vk;
 
 use super::context::{Context, OrVulkan};
 use super::pipeline_cache::PipelineCache;
+use super::ray_tracing::no_ray_query;
 use crate::error::{Error, Result};
 use crate::stage::{Access, Shader, StageDesc};
 
@@ -22,15 +24,19 @@ pub(super) struct Pipeline {
     pub handle: vk::Pipeline,
     pub layout: vk::PipelineLayout,
     pub set_layout: vk::DescriptorSetLayout,
+    /// Whether the device traces its rays by itself, through what a second set binds.
+    pub ray_query: bool,
 }
 
-/// A shader's name and its specialisation constants, by id.
-type Key = (&'static str, Vec<(u32, u32)>);
+/// A shader's module, by its name and whether it has ray queries.
+type Module = (&'static str, bool);
+/// A module and its specialisation constants, by id.
+type Key = (Module, Vec<(u32, u32)>);
 
 pub(super) struct Pipelines {
     cache: PipelineCache,
     flags: vk::PipelineCreateFlags,
-    layouts: HashMap<&'static str, Layouts>,
+    layouts: HashMap<Module, Layouts>,
     pipelines: HashMap<Key, Pipeline>,
 }
 
@@ -63,14 +69,16 @@ impl Pipelines {
                 constants.push((constant.id, *value));
             }
         }
-        let key = (shader.name, constants);
+        let ray_query = stage.ray_query();
+        let module = (shader.name, ray_query.is_some());
+        let key = (module, constants);
         if let Some(pipeline) = self.pipelines.get(&key) {
             return Ok(*pipeline);
         }
-        if !self.layouts.contains_key(shader.name) {
-            self.layouts.insert(shader.name, layouts(context, shader)?);
-        }
-        let layouts = &self.layouts[shader.name];
+        let layouts = match self.layouts.entry(module) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(place) => place.insert(layouts(context, shader, ray_query)?),
+        };
         let entries: Vec<_> = key
             .1
             .iter()
@@ -108,6 +116,7 @@ impl Pipelines {
             handle,
             layout: layouts.pipeline,
             set_layout: layouts.set,
+            ray_query: ray_query.is_some(),
         };
         self.pipelines.insert(key, pipeline);
         Ok(pipeline)
@@ -129,8 +138,13 @@ impl Pipelines {
     }
 }
 
-fn layouts(context: &Context, shader: &Shader) -> Result<Layouts> {
-    let code = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv))
+fn layouts(context: &Context, shader: &Shader, ray_query: Option<&'static [u8]>) -> Result<Layouts> {
+    let for_rays = match (&context.ray_tracing, ray_query) {
+        (_, None) => None,
+        (Some(tracing), Some(_)) => Some(tracing.set_layout),
+        (None, Some(_)) => return Err(no_ray_query("at hand")),
+    };
+    let code = ash::util::read_spv(&mut std::io::Cursor::new(ray_query.unwrap_or(shader.spirv)))
         .map_err(|error| Error::Device(format!("stage {}: {error}", shader.name)))?;
     let bindings: Vec<_> = shader
         .bindings
@@ -162,7 +176,7 @@ fn layouts(context: &Context, shader: &Shader) -> Result<Layouts> {
             .device
             .create_descriptor_set_layout(&vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings), None)
             .or_vulkan("vkCreateDescriptorSetLayout")?;
-        let sets = [set];
+        let sets: Vec<_> = [set].into_iter().chain(for_rays).collect();
         let create = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&sets)
             .push_constant_ranges(&ranges);

@@ -111,6 +111,7 @@ mod tests {
             max_texels,
             max_shared_memory_bytes: 1 << 14,
             max_allocation_bytes,
+            ray_query: false,
             lacks: Vec::new(),
         }
     }

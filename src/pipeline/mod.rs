@@ -18,7 +18,7 @@ use crate::config::{Accel, RenderConfig, Totals};
 use crate::emission::Aim;
 use crate::error::{Error, Result, Setting};
 use crate::gather::{METHODS, default_method, grid_sizes};
-use crate::gpu::Device;
+use crate::gpu::{Device, DeviceSummary};
 use crate::layout::{Settings, StatusCounters};
 use crate::packing::IN_VACUUM;
 use crate::packing::PackedScene;
@@ -87,6 +87,10 @@ impl Renderer {
             let what = format!("{}: runs on the CPU alone", method.name);
             return Err(Error::setting(Setting::Gather, what));
         }
+        let config = RenderConfig {
+            accel: accel_on(&config, device.summary())?,
+            ..config
+        };
         let within = |loop_limit, device: &Device| Limits {
             storage_buffer_bytes: buffer_bytes,
             ..limits(device.summary(), loop_limit, scene)
@@ -105,6 +109,9 @@ impl Renderer {
         let sizes = Sizes::new(&config, limits);
         for (id, bytes) in scene_buffers(scene, config.triangle_test) {
             device.upload(id, bytes)?;
+        }
+        if config.accel == Accel::RayQuery {
+            device.trace_through(&scene.shading_triangles, scene.own_triangles, &scene.instances)?;
         }
         let settings = settings(&config, scene, camera, limits.loop_limit);
         let mut renderer = Self {
@@ -256,6 +263,20 @@ impl Renderer {
         self.reported = None;
         self.make_buffers(recording)?;
         self.device.run(recording)
+    }
+}
+
+/// How rays meet triangles on a device.
+fn accel_on(config: &RenderConfig, device: &DeviceSummary) -> Result<Accel> {
+    let is_gpu = ["discrete", "integrated", "virtual"].contains(&device.kind);
+    match config.accel {
+        Accel::Auto if is_gpu && device.ray_query => Ok(Accel::RayQuery),
+        Accel::Auto => Ok(Accel::Bvh),
+        Accel::RayQuery if !device.ray_query => Err(Error::Device(format!(
+            "--accel ray-query: device {} traces no rays by itself (VK_KHR_ray_query); use --accel bvh or another --device",
+            device.name
+        ))),
+        chosen => Ok(chosen),
     }
 }
 

@@ -9,7 +9,7 @@ use crate::random::CameraTurn;
 use crate::record::Recording;
 use crate::shaders;
 use crate::sizes::Sizes;
-use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS, Shader, StageDesc};
+use crate::stage::{BufferId, RAY_QUERY, SEQUENCE_FILMS, SEQUENCE_SUMS, Shader, StageDesc};
 
 /// The stages of a render, as data: what an iteration runs, without a device.
 #[derive(Clone, Copy)]
@@ -199,6 +199,7 @@ impl Stages<'_> {
     fn ray_stage(&self, shader: &'static Shader, threads: u32) -> StageDesc {
         let mut constants = vec![
             ("BRUTE_FORCE", u32::from(self.config.accel == Accel::Brute)),
+            (RAY_QUERY, u32::from(self.config.accel == Accel::RayQuery)),
             ("HAVEL", u32::from(self.config.triangle_test == TriangleTest::Havel)),
             ("SAMPLER", self.config.sampler as u32),
             ("SLOTS", self.sizes.slots_per_pixel),

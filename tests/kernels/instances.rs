@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 use super::agreement::Agreement;
 use super::bench::{packed, random_numbers, scene, small, xyz};
-use super::rays::{Probe, Ray, ray};
+use super::rays::{Probe, Ray, accels, ray};
 
 fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")
@@ -109,7 +109,7 @@ fn rays_meet_instances_as_they_meet_meshes_of_their_own() {
     let on_instances = on_instances.count();
     assert!(4 * on_instances > rays.len(), "only {on_instances} rays meet instances");
     for test in [TriangleTest::Watertight, TriangleTest::Havel] {
-        for accel in [Accel::Bvh, Accel::Brute] {
+        for accel in accels() {
             let found = hits(&shared, test, accel);
             assert_same(&format!("hits by {test:?}, {accel:?}"), &found, &expected);
         }

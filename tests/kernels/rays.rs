@@ -1,19 +1,15 @@
-//! Rays against triangles on the device: where rounding decides, nothing may pass between two triangles.
+//! Rays against triangles on the device: where rounding decides, nothing may pass between two triangles, whether the kernels or the
+//! device itself trace the ray.
 
 use glam::Vec3;
 use ppm_vk::internals::config::{Accel, RenderConfig, TriangleTest};
-use ppm_vk::internals::gpu::Device;
-use ppm_vk::internals::packing::PackedScene;
-use ppm_vk::internals::packing::SceneFeatures;
+use ppm_vk::internals::gpu::{Device, best_device};
+use ppm_vk::internals::packing::{PackedScene, SceneFeatures};
 use ppm_vk::internals::pipeline::Renderer;
 use ppm_vk::internals::record::Recording;
-use ppm_vk::internals::scene::Object;
-use ppm_vk::internals::scene::Placement;
-use ppm_vk::internals::scene::SHARED;
-use ppm_vk::internals::scene::Scene;
-use ppm_vk::internals::scene::Triangle;
+use ppm_vk::internals::scene::{Object, Placement, SHARED, Scene, Triangle};
 use ppm_vk::internals::shaders;
-use ppm_vk::internals::stage::{BufferId, StageDesc};
+use ppm_vk::internals::stage::{BufferId, RAY_QUERY, StageDesc};
 
 use super::bench::{random_numbers, scene};
 
@@ -35,11 +31,22 @@ pub struct Probe {
     features: SceneFeatures,
 }
 
-impl Probe {
-    fn new(scene: &Scene, triangle_test: TriangleTest) -> Self {
-        Self::with(scene, triangle_test, Accel::Bvh)
+/// What rays can be traced by here. Says so where that leaves out the device itself.
+pub fn accels() -> Vec<Accel> {
+    let device = best_device().expect("a device");
+    let mut accels = vec![Accel::Bvh, Accel::Brute];
+    if device.ray_query {
+        accels.push(Accel::RayQuery);
+    } else {
+        println!(
+            "ray queries skipped: {} traces no rays by itself (VK_KHR_ray_query)",
+            device.name
+        );
     }
+    accels
+}
 
+impl Probe {
     pub fn with(scene: &Scene, triangle_test: TriangleTest, accel: Accel) -> Self {
         let packed = PackedScene::new(scene).expect("a hierarchy");
         let config = RenderConfig {
@@ -69,6 +76,7 @@ impl Probe {
         let constants = vec![
             ("HAVEL", u32::from(self.triangle_test == TriangleTest::Havel)),
             ("BRUTE_FORCE", u32::from(self.accel == Accel::Brute)),
+            (RAY_QUERY, u32::from(self.accel == Accel::RayQuery)),
             ("INSTANCED", u32::from(self.features.instanced)),
         ];
         recording.dispatch(
@@ -101,12 +109,53 @@ impl Probe {
     }
 }
 
-/// Both tests on the same rays: none may pass with the watertight one; what passes with Havel's is counted.
+/// Both tests on the same rays: none may pass with the watertight one, whoever traces them; what passes with Havel's is counted.
 fn assert_tight(what: &str, scene: &Scene, rays: impl Fn() -> Box<dyn Iterator<Item = Ray>>) {
-    let (traced, leaked, first) = Probe::new(scene, TriangleTest::Watertight).leaks(rays());
-    let (_, by_havel, _) = Probe::new(scene, TriangleTest::Havel).leaks(rays());
-    println!("{what}: of {traced} rays {leaked} leave with the watertight test, {by_havel} with Havel's");
-    assert_eq!(leaked, 0, "{what}: of {traced} rays that leave, one is {first:?}");
+    let (_, by_havel, _) = Probe::with(scene, TriangleTest::Havel, Accel::Bvh).leaks(rays());
+    println!("{what}: {by_havel} rays leave with Havel's test");
+    for accel in accels().into_iter().filter(|&accel| accel != Accel::Brute) {
+        let (traced, leaked, first) = Probe::with(scene, TriangleTest::Watertight, accel).leaks(rays());
+        println!("{what}: of {traced} rays {leaked} leave by {accel:?}");
+        assert_eq!(
+            leaked, 0,
+            "{what}: of {traced} rays by {accel:?} that leave, one is {first:?}"
+        );
+    }
+}
+
+#[test]
+fn rays_meet_the_same_triangles_at_the_same_places_by_every_search() {
+    for name in ["cornell-spheres", "pool", "instances", "glasses"] {
+        let scene = scene(name);
+        let numbers: Vec<[f32; 4]> = random_numbers(2 * if long() { 1_000_000 } else { 20_000 }).collect();
+        let place = |[x, y, z, _]: [f32; 4]| 1.8 * Vec3::new(x, y, z) - 0.9;
+        let rays: Vec<Ray> = numbers
+            .chunks_exact(2)
+            .map(|pair| ray(place(pair[0]), place(pair[1]) - place(pair[0])))
+            .collect();
+        for test in [TriangleTest::Watertight, TriangleTest::Havel] {
+            let mut hits = accels().into_iter().map(|accel| {
+                let hits = Probe::with(&scene, test, accel).hits(&rays);
+                (
+                    accel,
+                    hits.into_iter().map(|hit| hit.map(f32::to_bits)).collect::<Vec<_>>(),
+                )
+            });
+            let (_, expected) = hits.next().expect("a search");
+            let met = expected.iter().filter(|hit| hit[3] != u32::MAX).count();
+            assert!(4 * met > rays.len(), "{name}: only {met} rays meet anything");
+            for (accel, found) in hits {
+                let differ: Vec<usize> = (0..rays.len()).filter(|&i| found[i] != expected[i]).collect();
+                let first = differ.first().map(|&i| {
+                    let [found, expected] = [found[i], expected[i]].map(|hit| hit.map(f32::from_bits));
+                    format!("{:?} meets {found:?} instead of {expected:?}", rays[i])
+                });
+                let what = format!("{name}, {test:?}: hits by {accel:?}");
+                println!("{what}: {} of {} differ", differ.len(), rays.len());
+                assert_eq!(differ.len(), 0, "{what}: {first:?}");
+            }
+        }
+    }
 }
 
 /// A scene whose only object is this, in render space as it is.

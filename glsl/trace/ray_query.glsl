@@ -1,0 +1,47 @@
+// Rays that the device traces itself (VK_KHR_ray_query). Stages that trace are compiled a second time with RAY_QUERY, for devices
+// that can load it.
+
+// Instance 0 has the triangles in render space; the others follow in the order of Instances. What the device knows of a triangle is
+// its box: it finds the boxes that a ray enters, and the tests of intersect.glsl decide. So hits are the same as by the other searches,
+// to the bit and on every device, and no ray passes an edge by a device's own rounding.
+layout(set = 1, binding = 0) uniform accelerationStructureEXT Tlas;
+
+Hit trace_by_query(Ray ray, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
+    Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
+    rayQueryEXT query;
+    rayQueryInitializeEXT(query, Tlas, gl_RayFlagsNoneEXT, 0xffu, ray.origin, progress.t, ray.direction,
+                          min(limit * (1.0 + 2.0 * TIE), 1e30));
+    bool over = false;
+    while (!over && rayQueryProceedEXT(query)) {
+        loop_count += 1u;
+        PlacedTriangle at = PlacedTriangle(rayQueryGetIntersectionPrimitiveIndexEXT(query, false), NO_INSTANCE);
+        uint instance = rayQueryGetIntersectionInstanceIdEXT(query, false);
+        bool is_placed = INSTANCED && instance != 0u;
+        mat3x4 rows = UNPLACED;
+        if (is_placed) {
+            Instance placement = instance_at(instance - 1u);
+            rows = placement.rows;
+            at.instance = instance - 1u;
+            at.triangle += placement.first_triangle;
+        }
+        ShadingTriangle triangle = shading_triangle(at.triangle);
+        vec3 corner0 = triangle.p0.xyz;
+        vec3 corner1 = triangle.p1.xyz;
+        vec3 corner2 = triangle.p2.xyz;
+        LocalRay local = in_render_space(ray);
+        if (is_placed) {
+            corner0 = placed(rows, corner0);
+            corner1 = placed(rows, corner1);
+            corner2 = placed(rows, corner2);
+            if (HAVEL) {
+                local = in_instance(ray, inverse_rows(rows), 0.0);
+            }
+        }
+        if (at != ignored && intersect_triangle(ray, local, corner0, corner1, corner2, at, progress, hit)) {
+            over = any_hit;
+            // The device goes on with boxes that begin before that. Rounding puts faces in one place a little behind each other.
+            rayQueryGenerateIntersectionEXT(query, min(hit.t * (1.0 + TIE), 1e30));
+        }
+    }
+    return hit;
+}
