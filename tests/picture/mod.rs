@@ -1,10 +1,13 @@
 //! Loading scenes and rendering pictures of them.
 
+use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 
 use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::RenderConfig;
-use ppm_vk::internals::film::{Image, read_exr};
+use ppm_vk::internals::film::{Image, read_exr, write_png};
 use ppm_vk::internals::gpu::Device;
 use ppm_vk::internals::metrics::{Defects, defects};
 use ppm_vk::internals::packing::PackedScene;
@@ -17,7 +20,54 @@ pub fn folder() -> PathBuf {
 
 /// The picture in `tests/references` that another renderer made of the scene of this name.
 pub fn reference(name: &str) -> Image {
-    read_exr(&folder().join("tests/references").join(name).with_extension("exr")).expect("reference")
+    let image = read_exr(&folder().join("tests/references").join(name).with_extension("exr")).expect("reference");
+    remember(&format!("{name}-reference"), &image);
+    image
+}
+
+/// Pictures that a test keeps in mind.
+const REMEMBERED: usize = 6;
+
+thread_local! {
+    /// The last pictures that the test of this thread made or read.
+    static PICTURES: RefCell<VecDeque<(String, Image)>> = const { RefCell::new(VecDeque::new()) };
+}
+
+/// Has a picture written if its test fails: into `failed-pictures` in cargo's folder for what tests write, as PNG, with the names of the
+/// test and of the picture.
+pub fn remember(name: &str, image: &Image) {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            before(info);
+            write_remembered();
+        }));
+    });
+    PICTURES.with_borrow_mut(|pictures| {
+        if pictures.len() == REMEMBERED {
+            pictures.pop_front();
+        }
+        pictures.push_back((name.to_owned(), image.clone()));
+    });
+}
+
+fn write_remembered() {
+    let test = std::thread::current().name().unwrap_or("test").replace("::", "-");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("failed-pictures");
+    // A panic within a panic would end the process: what can't be written is told.
+    let pictures = PICTURES.try_with(|pictures| pictures.try_borrow_mut().map(|mut it| std::mem::take(&mut *it)));
+    let pictures = pictures.ok().and_then(Result::ok).unwrap_or_default();
+    for (number, (name, image)) in pictures.iter().enumerate() {
+        let path = folder.join(format!("{test}-{number}-{name}.png"));
+        let written = std::fs::create_dir_all(&folder)
+            .map_err(|error| error.to_string())
+            .and_then(|()| write_png(image, &path, 0.0).map_err(|error| error.to_string()));
+        match written {
+            Ok(()) => eprintln!("picture: {}", path.display()),
+            Err(error) => eprintln!("{}: {error}", path.display()),
+        }
+    }
 }
 
 /// A square picture.
@@ -68,6 +118,7 @@ impl Subject {
     pub fn clean_picture(&self, renderer: &mut Renderer) -> Image {
         let name = &self.scene.name;
         let image = renderer.resolve().expect("picture");
+        remember(name, &image);
         let counters = renderer.counters();
         assert_eq!(counters.non_finite, 0, "{name}: NaN or infinity in a stage");
         assert_eq!(counters.cut_paths, 0, "{name}: paths cut by the driver's loop limit");
