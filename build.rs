@@ -62,6 +62,17 @@ fn main() -> Result<()> {
         let by_query = with_ray_query(&compiler, &text, &file, &root)?;
         if let Some(module) = &by_query {
             check_bindings(module.as_binary(), &entry_point).with_context(|| format!("{file} with ray queries"))?;
+            let named = compile(
+                &compiler,
+                &by_query_text(&text)?,
+                &file,
+                &root,
+                shaderc::OptimizationLevel::Zero,
+            )?;
+            ensure!(
+                slots(&reflect(named.as_binary(), false)?) == slots(&entry_point),
+                "{file}: bindings are numbered otherwise with ray queries"
+            );
             fs::write(out.join(format!("{name}.ray_query.spv")), module.as_binary_u8())?;
         }
         describe(&mut module, &name, &entry_point, by_query.is_some()).with_context(|| source.display().to_string())?;
@@ -101,6 +112,24 @@ fn compile(
     Ok(compiler.compile_into_spirv(text, shaderc::ShaderKind::Compute, file, "main", Some(&options))?)
 }
 
+fn by_query_text(text: &str) -> Result<String> {
+    let (version, rest) = text.split_once('\n').context("an empty stage")?;
+    Ok(format!(
+        "{version}\n#extension GL_EXT_ray_query : require\n#define RAY_QUERY\n#line 2\n{rest}"
+    ))
+}
+
+/// Names and bindings of the first descriptor set.
+fn slots(entry_point: &EntryPoint) -> BTreeMap<u32, String> {
+    let slot = |variable: &Variable| match variable {
+        Variable::Descriptor { name, desc_bind, .. } if desc_bind.set() == 0 => {
+            Some((desc_bind.bind(), name.clone().unwrap_or_default()))
+        }
+        _ => None,
+    };
+    entry_point.vars.iter().filter_map(slot).collect()
+}
+
 /// The stage with rays that the device traces itself, if it traces any: a module that other devices can't load.
 fn with_ray_query(
     compiler: &shaderc::Compiler,
@@ -108,14 +137,19 @@ fn with_ray_query(
     file: &str,
     root: &Path,
 ) -> Result<Option<shaderc::CompilationArtifact>> {
+    const OP_RAY_QUERY_INITIALIZE: u32 = 4473;
     let level = shaderc::OptimizationLevel::Performance;
-    let (version, rest) = text.split_once('\n').context("an empty stage")?;
-    let text = format!("{version}\n#extension GL_EXT_ray_query : require\n#define RAY_QUERY\n#line 2\n{rest}");
+    let text = by_query_text(text)?;
     let preprocessed = compiler.preprocess(&text, file, "main", Some(&options(root, level)?))?;
     if !preprocessed.as_text().contains("rayQueryInitializeEXT") {
         return Ok(None);
     }
-    compile(compiler, &text, file, root, level).map(Some)
+    let module = compile(compiler, &text, file, root, level)?;
+    // Some stages include the traversal and don't call it.
+    let traces = instructions(module.as_binary())?
+        .iter()
+        .any(|instruction| code(instruction) == OP_RAY_QUERY_INITIALIZE);
+    Ok(traces.then_some(module))
 }
 
 fn options(root: &Path, level: shaderc::OptimizationLevel) -> Result<shaderc::CompileOptions<'_>> {
@@ -165,20 +199,35 @@ fn check_bindings(spirv: &[u32], entry_point: &EntryPoint) -> Result<()> {
             _ => None,
         })
         .collect();
-    let mut rest = &spirv[5..];
-    while let [first, ..] = rest {
-        let (words, op) = ((first >> 16) as usize, first & 0xffff);
-        ensure!(words > 0 && words <= rest.len(), "damaged SPIR-V");
-        if op == OP_DECORATE && rest[2] == BINDING {
+    for instruction in instructions(spirv)? {
+        if let [_, _, BINDING, slot, ..] = instruction
+            && code(instruction) == OP_DECORATE
+        {
             ensure!(
-                reflected.contains(&rest[3]),
-                "binding {} wasn't reflected; use its buffer by name",
-                rest[3]
+                reflected.contains(slot),
+                "binding {slot} wasn't reflected; use its buffer by name"
             );
         }
-        rest = &rest[words..];
     }
     Ok(())
+}
+
+/// The instructions of a SPIR-V module, after its head of five words.
+fn instructions(spirv: &[u32]) -> Result<Vec<&[u32]>> {
+    let mut instructions = Vec::new();
+    let mut rest = &spirv[5..];
+    while let [first, ..] = rest {
+        let words = (first >> 16) as usize;
+        ensure!(words > 0 && words <= rest.len(), "damaged SPIR-V");
+        let (instruction, after) = rest.split_at(words);
+        instructions.push(instruction);
+        rest = after;
+    }
+    Ok(instructions)
+}
+
+fn code(instruction: &[u32]) -> u32 {
+    instruction[0] & 0xffff
 }
 
 /// Appends the `Shader` constant of the stage `name` to the module.

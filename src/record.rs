@@ -224,12 +224,7 @@ mod tests {
     fn a_launch_that_would_take_too_long_is_divided() {
         assert_eq!(
             parts(&[10, 2500, 100], |_| true),
-            [
-                vec![(10, 1)],
-                vec![(2500, 3)],
-                vec![(2500, 3)],
-                vec![(2500, 3), (100, 1)]
-            ]
+            [vec![(10, 1), (2500, 3)], vec![(2500, 3)], vec![(2500, 3), (100, 1)]]
         );
     }
 

@@ -291,6 +291,7 @@ Hit trace_all(Ray ray, Progress progress, float limit, PlacedTriangle ignored, b
 }
 
 #ifdef RAY_QUERY
+layout(constant_id = 63) const bool BY_HIERARCHY = false;
 #include "trace/ray_query.glsl"
 #endif
 
@@ -384,7 +385,12 @@ Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, Plac
         hit = trace_all(ray, progress, limit, ignored, any_hit);
     } else {
 #ifdef RAY_QUERY
-        hit = trace_by_query(ray, progress, limit, ignored, any_hit);
+        // The hierarchy stays reachable, so that bindings are numbered as in the other module.
+        if (BY_HIERARCHY) {
+            hit = trace_hierarchy(ray, progress, limit, ignored, any_hit);
+        } else {
+            hit = trace_by_query(ray, progress, limit, ignored, any_hit);
+        }
 #else
         hit = trace_hierarchy(ray, progress, limit, ignored, any_hit);
 #endif

@@ -272,10 +272,13 @@ fn accel_on(config: &RenderConfig, device: &DeviceSummary) -> Result<Accel> {
     match config.accel {
         Accel::Auto if is_gpu && device.ray_query => Ok(Accel::RayQuery),
         Accel::Auto => Ok(Accel::Bvh),
-        Accel::RayQuery if !device.ray_query => Err(Error::Device(format!(
-            "--accel ray-query: device {} traces no rays by itself (VK_KHR_ray_query); use --accel bvh or another --device",
-            device.name
-        ))),
+        Accel::RayQuery if !device.ray_query => {
+            let what = format!(
+                "ray-query: device {} has no VK_KHR_ray_query; use bvh or another device",
+                device.name
+            );
+            Err(Error::setting(Setting::Accel, what))
+        }
         chosen => Ok(chosen),
     }
 }
