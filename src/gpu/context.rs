@@ -64,7 +64,7 @@ pub struct DeviceSummary {
 pub(super) type Messages = Arc<Mutex<Vec<String>>>;
 
 /// Loader and instance.
-pub(super) struct Instance {
+pub(super) struct VulkanInstance {
     _entry: ash::Entry, // keeps the loader
     pub handle: ash::Instance,
     /// Whether objects and passes can be named.
@@ -79,7 +79,7 @@ unsafe extern "system" fn on_message(
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     messages: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: the layer passes valid data, and `messages` outlives the messenger (see Instance).
+    // SAFETY: the layer passes valid data, and `messages` outlives the messenger (see VulkanInstance).
     unsafe {
         let text = (*data)
             .message_as_c_str()
@@ -100,9 +100,9 @@ fn has(extensions: &[vk::ExtensionProperties], name: &CStr) -> bool {
 
 /// The instance that is alive, if one is. Loaders have been seen to crash where one thread makes an instance while
 /// another names an object.
-static SHARED: Mutex<Weak<Instance>> = Mutex::new(Weak::new());
+static SHARED: Mutex<Weak<VulkanInstance>> = Mutex::new(Weak::new());
 
-impl Instance {
+impl VulkanInstance {
     /// The process's one instance.
     pub fn shared() -> Result<Arc<Self>> {
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -322,7 +322,7 @@ impl Instance {
     }
 }
 
-impl Drop for Instance {
+impl Drop for VulkanInstance {
     fn drop(&mut self) {
         // SAFETY: everything made from the instance is gone: Context, its only user, drops it last.
         unsafe {
@@ -347,12 +347,12 @@ pub(super) struct Context {
     pub ray_tracing: Option<RayTracing>,
     /// Whether kernels are only compiled. A device that isn't there can't be waited for.
     compiles_only: bool,
-    pub instance: Arc<Instance>,
+    pub instance: Arc<VulkanInstance>,
 }
 
 impl Context {
     /// `compiles_only`: to ask what kernels are compiled to, and run none.
-    pub fn new(instance: Arc<Instance>, physical: vk::PhysicalDevice, compiles_only: bool) -> Result<Self> {
+    pub fn new(instance: Arc<VulkanInstance>, physical: vk::PhysicalDevice, compiles_only: bool) -> Result<Self> {
         let (family, timestamp_bits) = instance
             .compute_family(physical)
             .ok_or_else(|| Error::Device("the device has no compute queue".to_owned()))?;

@@ -6,7 +6,7 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 
 use super::buffer::Buffer;
-use super::context::{Context, DeviceSummary, Instance};
+use super::context::{Context, DeviceSummary, VulkanInstance};
 use super::descriptors::Descriptors;
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
@@ -21,7 +21,7 @@ use crate::text;
 /// # Errors
 /// No loader or no instance.
 pub fn devices() -> Result<Vec<DeviceSummary>> {
-    Ok(Instance::shared()?
+    Ok(VulkanInstance::shared()?
         .devices()?
         .into_iter()
         .map(|(_, summary)| summary)
@@ -33,7 +33,7 @@ pub fn devices() -> Result<Vec<DeviceSummary>> {
 /// # Errors
 /// No loader, or no device.
 pub fn best_device() -> Result<DeviceSummary> {
-    choose(Instance::shared()?.devices()?, None).map(|(_, summary)| summary)
+    choose(VulkanInstance::shared()?.devices()?, None).map(|(_, summary)| summary)
 }
 
 /// An open device and its buffers.
@@ -58,7 +58,7 @@ impl Device {
     /// # Errors
     /// No loader, no such device, or one that lacks what the program needs.
     pub fn open(choice: Option<&str>) -> Result<Self> {
-        let instance = Instance::shared()?;
+        let instance = VulkanInstance::shared()?;
         let devices = instance.devices()?;
         let (physical, summary) = choose(devices, choice)?;
         check_usable(&summary)?;

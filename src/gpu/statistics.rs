@@ -3,7 +3,7 @@
 
 use ash::{khr, vk};
 
-use super::context::{Context, DeviceSummary, Instance, OrVulkan};
+use super::context::{Context, DeviceSummary, OrVulkan, VulkanInstance};
 use super::device::choose;
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
@@ -24,7 +24,7 @@ impl Compiler {
     /// # Errors
     /// No such device, or a driver that says nothing of what it compiles.
     pub fn open(choice: Option<&str>) -> Result<Self> {
-        let instance = Instance::shared()?;
+        let instance = VulkanInstance::shared()?;
         let (physical, summary) = choose(instance.devices()?, choice)?;
         if !instance.tells_statistics(physical)? {
             return Err(Error::unfit(
