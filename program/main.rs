@@ -14,7 +14,7 @@ fn main() -> ExitCode {
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(error) => {
             // A stderr that can't be written to must not change the exit code.
-            let line = ppm_vk::internals::text::escaped(&format!("error: {}", cli::words::line(&error)));
+            let line = ppm_vk::internals::text::escaped(&format!("error: {}", cli::advice::line(&error)));
             let _ = writeln!(std::io::stderr(), "{line}");
             ExitCode::FAILURE
         }

@@ -289,7 +289,7 @@ fn the_library_builds_without_what_only_the_program_needs() {
     }
 }
 
-/// The program adds them: `program/cli/words.rs`.
+/// The program adds them: `program/cli/advice.rs`.
 #[test]
 fn the_librarys_messages_name_no_flags() {
     for (file, text) in code() {

@@ -11,9 +11,9 @@ use ppm_vk::internals::scene::Surface;
 use ppm_vk::internals::text::escaped;
 use ppm_vk::{Memory, PreparedScene, RenderConfig, Scene, best_device};
 
+use super::advice;
 use super::progress::{BUILDING, while_showing};
 use super::scene::SceneArguments;
-use super::words;
 
 /// `ppm-vk devices`.
 pub fn devices(as_json: bool) -> Result<String> {
@@ -75,9 +75,9 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     let packed = prepared.packed();
     let count = |is: fn(&Surface) -> bool| scene.materials.iter().filter(|material| is(&material.surface)).count();
     let emissive = scene.emissive_triangle_count();
-    let of_scene = scene.notes.iter().map(words::of_remark);
+    let of_scene = scene.notes.iter().map(advice::of_remark);
     let notes: Vec<String> = of_scene.chain(prepared.notes().iter().cloned()).collect();
-    let warnings: Vec<String> = scene.warnings.iter().map(words::of_remark).collect();
+    let warnings: Vec<String> = scene.warnings.iter().map(advice::of_remark).collect();
     let to_world = |p: glam::Vec3| p.as_dvec3() / scene.normalisation.scale + scene.normalisation.centre;
     let (low, high) = scene.bounds();
     let (low, high) = (to_world(low), to_world(high));

@@ -10,6 +10,7 @@ macro_rules! say {
     };
 }
 
+pub mod advice;
 mod args;
 mod bench;
 mod compare;
@@ -20,7 +21,6 @@ mod outputs;
 mod progress;
 mod render;
 mod scene;
-pub mod words;
 
 use std::io::Write as _;
 

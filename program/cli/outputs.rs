@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 
-use super::words;
+use super::advice;
 use ppm_vk::internals::files::check_writable;
 
 /// What a path names: files are one file if any of these is the same.
@@ -85,7 +85,7 @@ pub fn check_outputs<'a>(inputs: &[&Path], outputs: impl Iterator<Item = &'a Pat
 /// Fails if any of these has, with all that failed in one line: what can't be written doesn't stop the others.
 pub fn all(written: impl IntoIterator<Item = Result<()>>) -> Result<()> {
     let failures = written.into_iter().filter_map(Result::err);
-    let failures: Vec<String> = failures.map(|error| words::line(&error)).collect();
+    let failures: Vec<String> = failures.map(|error| advice::line(&error)).collect();
     ensure!(failures.is_empty(), "{}", failures.join("; "));
     Ok(())
 }

@@ -19,7 +19,7 @@ use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::outputs::{all, check_outputs};
 use super::progress::{BUILDING, Bar, while_showing, with_prefix};
 use super::scene::say_remarks;
-use super::{Outcome, interrupt, words};
+use super::{Outcome, advice, interrupt};
 
 /// Iterations where the user gives neither them nor a time.
 const DEFAULT_ITERATIONS: u32 = 64;
@@ -101,7 +101,7 @@ fn write_outputs(arguments: &RenderArguments, output: &Path, rendered: &Rendered
         file.as_ref().map(|file| write_json(file, &value()))
     };
     let written = [
-        rendered.failure().map(|failure| Err(words::of_failure(failure))),
+        rendered.failure().map(|failure| Err(advice::of_failure(failure))),
         Some(picture.map_err(Error::from)),
         png.map(|file| Ok(rendered.write_png(file, arguments.exposure)?)),
         arguments
@@ -116,7 +116,7 @@ fn write_outputs(arguments: &RenderArguments, output: &Path, rendered: &Rendered
 fn say_warnings(warnings: &[Warning]) {
     for warning in warnings {
         let kind = if warning.is_slight() { "note" } else { "warning" };
-        say!("{kind}: {}", words::of_warning(warning));
+        say!("{kind}: {}", advice::of_warning(warning));
     }
 }
 

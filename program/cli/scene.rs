@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, anyhow};
 use clap::Args;
 
+use super::advice;
 use super::args::{choice, number, positive};
 use super::progress::{READING, while_showing};
-use super::words;
 use ppm_vk::internals::loader::MEMORY_LIMIT;
 use ppm_vk::{Environment, LightUnits, LoadOptions, Scene};
 
@@ -141,10 +141,10 @@ impl SceneArguments {
 /// Says what a user should know of a scene.
 pub fn say_remarks(scene: &Scene) {
     for note in &scene.notes {
-        say!("note: {}", words::of_remark(note));
+        say!("note: {}", advice::of_remark(note));
     }
     for warning in &scene.warnings {
-        say!("warning: {}", words::of_remark(warning));
+        say!("warning: {}", advice::of_remark(warning));
     }
 }
 
