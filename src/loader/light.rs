@@ -10,7 +10,7 @@ use gltf_json::{Index, Root};
 use super::LoadOptions;
 use super::diagnostic::{Check, Warnings, damaged, label};
 use super::graph::{PlacedNode, node_label};
-use crate::scene::{Emission, Normalisation, PunctualLight};
+use crate::scene::{LightKind, Normalisation, PunctualLight};
 
 /// A spot's cone is no narrower than this between its edges, as a part of its 1 − cos: exporters write edges that are as
 /// good as the same.
@@ -48,7 +48,7 @@ pub(crate) fn punctual_lights(
             ))
         })?;
         let label = label("light", index, light.name.as_deref());
-        let Some(emission) = emission(light, placed).map_err(|what| format!("{label}: {what}"))? else {
+        let Some(kind) = kind_of(light, placed).map_err(|what| format!("{label}: {what}"))? else {
             warnings.push(format!(
                 "{label}: {} leaves it no direction (a scale of zero), and it is skipped",
                 node_label(root, placed.index)
@@ -56,7 +56,7 @@ pub(crate) fn punctual_lights(
             continue;
         };
         let light_in_place =
-            place(light, emission, placed, normalisation, options, root).map_err(|what| format!("{label}: {what}"))?;
+            place(light, kind, placed, normalisation, options, root).map_err(|what| format!("{label}: {what}"))?;
         if light_in_place.intensity.max_element() > 0.0 {
             lights.push(light_in_place);
         }
@@ -66,7 +66,7 @@ pub(crate) fn punctual_lights(
 
 /// How a light at a node shines; `None` if the node's transform leaves it no direction. Lengths of axes are ignored, as
 /// they are for cameras.
-fn emission(light: &JsonLight, placed: &PlacedNode<'_>) -> Check<Option<Emission>> {
+fn kind_of(light: &JsonLight, placed: &PlacedNode<'_>) -> Check<Option<LightKind>> {
     let Checked::Valid(kind) = light.type_ else {
         return Err(damaged("its type is neither point nor spot nor directional"));
     };
@@ -74,11 +74,11 @@ fn emission(light: &JsonLight, placed: &PlacedNode<'_>) -> Check<Option<Emission
         .try_normalize()
         .map(DVec3::as_vec3);
     Ok(match kind {
-        Type::Point => Some(Emission::Point),
-        Type::Directional => direction.map(|direction| Emission::Directional { direction }),
+        Type::Point => Some(LightKind::Point),
+        Type::Directional => direction.map(|direction| LightKind::Directional { direction }),
         Type::Spot => {
             let (inner, outer) = cone(light)?;
-            direction.map(|direction| Emission::Spot {
+            direction.map(|direction| LightKind::Spot {
                 direction,
                 inner,
                 outer,
@@ -111,7 +111,7 @@ fn cone(light: &JsonLight) -> Check<(f64, f64)> {
 
 fn place(
     light: &JsonLight,
-    emission: Emission,
+    kind: LightKind,
     placed: &PlacedNode<'_>,
     normalisation: Normalisation,
     options: &LoadOptions,
@@ -135,7 +135,7 @@ fn place(
             .filter(|range| range.is_finite())
             .map(|range| f64::from(range) * normalisation.scale),
     };
-    let is_directional = matches!(emission, Emission::Directional { .. });
+    let is_directional = matches!(kind, LightKind::Directional { .. });
     // Radiance stays as it is in render space, and irradiance. Intensity is irradiance times a length's square.
     let unit = if is_directional {
         1.0
@@ -154,7 +154,7 @@ fn place(
         );
     }
     Ok(PunctualLight {
-        emission,
+        kind,
         position,
         intensity,
         extent: if is_directional {

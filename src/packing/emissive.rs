@@ -1,6 +1,6 @@
 //! Area lights: the triangles whose material emits.
 
-use super::shine::Shine;
+use super::emission_distribution::EmissionDistribution;
 use crate::scene::Scene;
 
 /// A triangle that emits light.
@@ -24,7 +24,7 @@ impl Scene {
     ///
     /// Photons are emitted, and lights sampled, nearly in proportion to their powers.
     pub fn emissive_triangles(&self) -> Vec<EmissiveTriangle> {
-        self.shining_triangles()
+        self.emission_distributions()
             .0
             .into_iter()
             .map(|(emissive, _)| emissive)
@@ -32,7 +32,7 @@ impl Scene {
     }
 
     /// Each with the way it shines over its area, and whether some would have to be known more finely than they are.
-    pub(crate) fn shining_triangles(&self) -> (Vec<(EmissiveTriangle, Shine)>, bool) {
+    pub(crate) fn emission_distributions(&self) -> (Vec<(EmissiveTriangle, EmissionDistribution)>, bool) {
         let even: Vec<EmissiveTriangle> = self
             .emitting_objects()
             .flat_map(|(object, exitance)| {
@@ -46,11 +46,11 @@ impl Scene {
                 })
             })
             .collect();
-        let (shines, is_coarse) = Shine::of_all(self, &even);
-        let shining = |(even, shine): (EmissiveTriangle, Shine)| {
-            let power = even.power * shine.mean;
-            (EmissiveTriangle { power, ..even }, shine)
+        let (distributions, is_coarse) = EmissionDistribution::of_all(self, &even);
+        let emissive = |(even, distribution): (EmissiveTriangle, EmissionDistribution)| {
+            let power = even.power * distribution.mean;
+            (EmissiveTriangle { power, ..even }, distribution)
         };
-        (even.into_iter().zip(shines).map(shining).collect(), is_coarse)
+        (even.into_iter().zip(distributions).map(emissive).collect(), is_coarse)
     }
 }

@@ -56,7 +56,7 @@ fn of_triangles(
     two_sided: &impl Fn(u32) -> bool,
 ) -> LightSource {
     // Parts that are surely dark bring nothing.
-    let shining = || {
+    let lit_parts = || {
         lights
             .iter()
             .zip(powers)
@@ -64,18 +64,18 @@ fn of_triangles(
             .map(|(light, _)| light)
     };
     let corners_of = |light: &Light| Part::of(light).corners(corners[light.triangle as usize].map(Vec3::as_dvec3));
-    let sphere = Sphere::around(shining().flat_map(corners_of)).unwrap_or(Sphere {
+    let sphere = Sphere::around(lit_parts().flat_map(corners_of)).unwrap_or(Sphere {
         centre: DVec3::ZERO,
         radius: 0.0,
     });
     let normals = || {
-        shining().map(|light| {
+        lit_parts().map(|light| {
             let [a, b, c] = corners_of(light);
             (b - a).cross(c - a)
         })
     };
     let axis = normals().sum::<DVec3>().normalize_or_zero();
-    let both = shining().any(|light| two_sided(light.triangle));
+    let both = lit_parts().any(|light| two_sided(light.triangle));
     let narrowest = normals()
         .map(|normal| axis.dot(normal.normalize_or_zero()))
         .fold(1.0, f64::min);

@@ -6,12 +6,12 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
-use super::doubled_lights::take_doubles;
-use super::shine::Shine;
+use super::duplicate_lights::remove_duplicates;
+use super::emission_distribution::EmissionDistribution;
 use super::{EmissiveTriangle, Part, light_sources};
 use crate::alias::alias_table;
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT, TRIANGLE_LIGHT};
-use crate::scene::{Emission, PunctualLight, Scene};
+use crate::scene::{LightKind, PunctualLight, Scene};
 
 /// The part of all choices of a light that goes to each object that emits, each punctual light and the environment alike
 /// instead of by flux. A light that is a million million times dimmer than another one would hardly have its turn, and
@@ -49,15 +49,15 @@ pub(crate) struct Lights {
 
 /// The lights, where triangles lie in this order.
 pub(crate) fn lights(scene: &Scene, order: &[u32]) -> Lights {
-    let (mut shining, is_coarse) = scene.shining_triangles();
+    let (mut emissive, is_coarse) = scene.emission_distributions();
     let mut place = vec![0; scene.triangles.len()];
     for (packed, &index) in order.iter().enumerate() {
         place[index as usize] = packed as u32;
     }
-    let doubles = take_doubles(scene, &mut shining);
+    let doubles = remove_duplicates(scene, &mut emissive);
     let doubles = doubles.iter().map(|pair| pair.map(|index| place[index as usize]));
     let doubles = doubles.collect();
-    let (mut candidates, mut sources) = emissive_triangles(scene, &place, shining);
+    let (mut candidates, mut sources) = emissive_triangles(scene, &place, emissive);
     let triangles = candidates.len() as u32;
     let punctual_lights = scene.lights.iter().map(|light| punctual(scene, light));
     let mut others: Vec<(Light, f64)> = punctual_lights.chain(environment(scene)).collect();
@@ -112,32 +112,34 @@ pub(crate) fn set_alias_table(lights: &mut [Light], probabilities: &[f64]) {
 fn emissive_triangles(
     scene: &Scene,
     place: &[u32],
-    mut shining: Vec<(EmissiveTriangle, Shine)>,
+    mut emissive: Vec<(EmissiveTriangle, EmissionDistribution)>,
 ) -> (Vec<Candidate>, Vec<Range<u32>>) {
     let object_of = |light: &EmissiveTriangle| scene.triangles[light.triangle as usize].object as usize;
-    shining.sort_by_key(|(light, _)| (object_of(light), place[light.triangle as usize]));
-    for of_object in shining.chunk_by_mut(|(a, _), (b, _)| object_of(a) == object_of(b)) {
-        if of_object.iter().all(|(_, shine)| shine.is_dark()) {
-            of_object.iter_mut().for_each(|(_, shine)| shine.not_dark());
+    emissive.sort_by_key(|(light, _)| (object_of(light), place[light.triangle as usize]));
+    for of_object in emissive.chunk_by_mut(|(a, _), (b, _)| object_of(a) == object_of(b)) {
+        if of_object.iter().all(|(_, distribution)| distribution.is_dark()) {
+            of_object
+                .iter_mut()
+                .for_each(|(_, distribution)| distribution.not_dark());
         }
     }
     let mut power_of_objects = vec![0.0; scene.objects.len()];
-    for (light, _) in &shining {
+    for (light, _) in &emissive {
         power_of_objects[object_of(light)] += light.power;
     }
     let mut sources = Vec::new();
-    for lights in shining.chunk_by(|(a, _), (b, _)| object_of(a) == object_of(b)) {
+    for lights in emissive.chunk_by(|(a, _), (b, _)| object_of(a) == object_of(b)) {
         let first = sources.last().map_or(0, |source: &Range<u32>| source.end);
-        let count: u32 = lights.iter().map(|(_, shine)| shine.columns.pow(2)).sum();
+        let count: u32 = lights.iter().map(|(_, distribution)| distribution.columns.pow(2)).sum();
         sources.push(first..first + count);
     }
-    let parts = shining.iter().flat_map(|(emissive, shine)| {
-        let parts = shine.columns.pow(2);
+    let parts = emissive.iter().flat_map(|(light, distribution)| {
+        let parts = distribution.columns.pow(2);
         (0..parts).map(move |number| {
             (
-                emissive,
-                shine.share(number),
-                Part::numbered(number, shine.columns),
+                light,
+                distribution.share(number),
+                Part::numbered(number, distribution.columns),
                 parts,
             )
         })
@@ -162,27 +164,27 @@ fn emissive_triangles(
 /// A light, and its power.
 fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
     // What comes along each direction, so that across the middle one all together is the irradiance.
-    let spread = match light.emission {
-        Emission::Directional { .. } => (0.5 * light.extent).cos().powi(2),
-        Emission::Point | Emission::Spot { .. } => 1.0,
+    let spread = match light.kind {
+        LightKind::Directional { .. } => (0.5 * light.extent).cos().powi(2),
+        LightKind::Point | LightKind::Spot { .. } => 1.0,
     };
     let common = Light {
         intensity: (light.intensity.as_dvec3() / spread).as_vec3().to_array(),
         position: light.position.to_array(),
-        extent: match light.emission {
-            Emission::Directional { .. } => 2.0 * (0.5 * light.extent).sin().powi(2),
-            Emission::Point | Emission::Spot { .. } => light.extent,
+        extent: match light.kind {
+            LightKind::Directional { .. } => 2.0 * (0.5 * light.extent).sin().powi(2),
+            LightKind::Point | LightKind::Spot { .. } => light.extent,
         } as f32,
         inverse_range: light.range.map_or(0.0, |range| (1.0 / range) as f32),
         ..Light::zeroed()
     };
     let mut disc_area = 0.0;
-    let packed = match light.emission {
-        Emission::Point => Light {
+    let packed = match light.kind {
+        LightKind::Point => Light {
             kind: POINT_LIGHT,
             ..common
         },
-        Emission::Spot {
+        LightKind::Spot {
             direction,
             inner,
             outer,
@@ -193,7 +195,7 @@ fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
             outer: outer as f32,
             ..common
         },
-        Emission::Directional { direction } => {
+        LightKind::Directional { direction } => {
             let (centre, area) = if light.extent > 0.0 {
                 // Rays of many directions come in through a sphere around the scene, as an environment's do.
                 (DVec3::ZERO, PI * bounding_radius(scene).powi(2))

@@ -1,8 +1,9 @@
 //! A scene in the layout of the device.
 
 mod bvh;
-mod contact;
-mod doubled_lights;
+mod coincident_faces;
+mod duplicate_lights;
+mod emission_distribution;
 mod emissive;
 mod environment_table;
 mod features;
@@ -14,7 +15,6 @@ mod near_lights;
 mod nesting;
 pub mod object_grid;
 mod part;
-mod shine;
 mod sphere;
 
 pub use emissive::EmissiveTriangle;
@@ -150,8 +150,8 @@ impl PackedScene {
         let materials: Vec<Material> = scene.materials.iter().map(material).collect();
         let nesting = Nesting::of(scene)?;
         let instances = instances(scene, &placed, &bvh.shared, &nesting.ranks);
-        let contacts = contact::contacts(&bvh.records, &shading_triangles, &instances, &materials);
-        for (triangle, flags) in shading_triangles.iter_mut().zip(contacts.flags) {
+        let coincident = coincident_faces::coincident_faces(&bvh.records, &shading_triangles, &instances, &materials);
+        for (triangle, flags) in shading_triangles.iter_mut().zip(coincident.flags) {
             triangle.flags |= flags;
             if triangle.object != SHARED {
                 triangle.flags |= nesting.ranks[triangle.object as usize] << RANK;
@@ -162,9 +162,9 @@ impl PackedScene {
         features.nested = nesting.overlaps;
         features.few_sources = (2..=ASKED_ALL).contains(&light_table.sources.len());
         features.many_sources = light_table.sources.len() > ASKED_ALL;
-        features.coincidence |= features.contact || contacts.doubled;
+        features.coincidence |= features.contact || coincident.doubled;
         // Where a solid has no thickness, it is a thin wall.
-        features.thin_walls |= features.contact && contacts.doubled;
+        features.thin_walls |= features.contact && coincident.doubled;
         let mut texels = scene.textures.texels.clone();
         texels.resize(texels.len().next_multiple_of(4), 0);
         let (object_grids, object_cells) = object_grids(scene);

@@ -43,7 +43,7 @@ impl NearLights<'_> {
     }
 
     /// Those of a range that shine.
-    fn shining(&self, range: Range<usize>) -> impl Iterator<Item = &Light> + Clone {
+    fn with_power(&self, range: Range<usize>) -> impl Iterator<Item = &Light> + Clone {
         let with_powers = self.lights[range.clone()].iter().zip(&self.powers[range]);
         with_powers.filter(|(_, power)| **power > 0.0).map(|(light, _)| light)
     }
@@ -51,7 +51,7 @@ impl NearLights<'_> {
     fn around(&self, source: &Range<u32>) -> Option<[f32; 4]> {
         let of_light =
             |light: &Light| Part::of(light).corners(self.corners[light.triangle as usize].map(Vec3::as_dvec3));
-        let lights = self.shining(source.start as usize..source.end as usize);
+        let lights = self.with_power(source.start as usize..source.end as usize);
         let sphere = Sphere::around(lights.flat_map(of_light))?;
         let radius2 = (REACH * sphere.radius).powi(2);
         Some(sphere.centre.as_vec3().extend(radius2 as f32).to_array())
@@ -67,7 +67,7 @@ impl NearLights<'_> {
             .map(|(light, environment)| f64::from(light.probability) * environment.spread())
             .sum();
         let triangles = self
-            .shining(0..self.lights.len())
+            .with_power(0..self.lights.len())
             .filter(|light| light.kind == TRIANGLE_LIGHT);
         let emissive: f64 = triangles.map(|light| f64::from(light.area)).sum();
         (emissive / area_of_all + 0.5 * from_afar).clamp(SAMPLING[0], SAMPLING[1]) as f32

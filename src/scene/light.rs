@@ -6,9 +6,9 @@ use glam::Vec3;
 
 use super::{Object, Scene};
 
-/// How a punctual light shines.
+/// The kind of a punctual light.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Emission {
+pub enum LightKind {
     /// In all directions.
     Point,
     /// Around an axis, all of it up to the inner angle, then less, and nothing past the outer angle.
@@ -30,8 +30,8 @@ pub enum Emission {
 /// A light that is no surface, in render space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PunctualLight {
-    /// How it shines.
-    pub emission: Emission,
+    /// Point, spot or directional.
+    pub kind: LightKind,
     /// Where it is; of no meaning where its rays are parallel.
     pub position: Vec3,
     /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB. Never black.
@@ -49,11 +49,11 @@ impl PunctualLight {
     pub fn power(&self, disc_area: f64) -> f64 {
         let intensity = self.intensity.as_dvec3().element_sum() / 3.0;
         intensity
-            * match self.emission {
-                Emission::Point => 4.0 * PI,
+            * match self.kind {
+                LightKind::Point => 4.0 * PI,
                 // The falloff is the square of a ramp, whose integral is a third of its width.
-                Emission::Spot { inner, outer, .. } => 2.0 * PI * (inner + (outer - inner) / 3.0),
-                Emission::Directional { .. } => disc_area,
+                LightKind::Spot { inner, outer, .. } => 2.0 * PI * (inner + (outer - inner) / 3.0),
+                LightKind::Directional { .. } => disc_area,
             }
     }
 }

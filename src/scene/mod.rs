@@ -14,7 +14,7 @@ mod texture;
 pub use camera::{Camera, Lens, Projection};
 pub(crate) use camera::{frame, framed_on};
 pub use environment::Environment;
-pub use light::{Emission, PunctualLight};
+pub use light::{LightKind, PunctualLight};
 pub(crate) use material::normal_reflectance;
 pub use material::{Alpha, Coat, Dielectric, Gloss, Material, MaterialTextures, Surface};
 pub use placement::Placement;

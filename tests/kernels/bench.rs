@@ -13,7 +13,7 @@ use ppm_vk::internals::layout::{CAUSTIC, Gloss, NEAREST, NO_OBJECT, Photon, Sett
 use ppm_vk::internals::packing::PackedScene;
 use ppm_vk::internals::pipeline::Renderer;
 use ppm_vk::internals::random::{PathKind, Random};
-use ppm_vk::internals::scene::{Camera, Emission, Environment, PunctualLight, Scene};
+use ppm_vk::internals::scene::{Camera, Environment, LightKind, PunctualLight, Scene};
 use ppm_vk::internals::stage::BufferId;
 
 /// What the names of scenes end in that have a light of every kind more than their file.
@@ -51,24 +51,24 @@ pub fn scene(name: &str) -> Scene {
 
 /// Adds punctual lights, and an environment in which each direction has its own radiance.
 fn add_lights(scene: &mut Scene) {
-    let light = |emission, position: Vec3, range| PunctualLight {
-        emission,
+    let light = |kind, position: Vec3, range| PunctualLight {
+        kind,
         position,
         intensity: Vec3::new(1.0, 0.8, 0.5),
         extent: 0.0,
         range,
     };
     let direction = Vec3::new(0.2, -1.0, -0.7).normalize();
-    let spot = Emission::Spot {
+    let spot = LightKind::Spot {
         direction,
         inner: 0.02,
         outer: 0.2,
     };
     scene.lights = vec![
-        light(Emission::Point, Vec3::new(0.3, 0.5, 0.2), None),
-        light(Emission::Point, Vec3::new(-0.4, 0.6, 0.4), Some(1.5)),
+        light(LightKind::Point, Vec3::new(0.3, 0.5, 0.2), None),
+        light(LightKind::Point, Vec3::new(-0.4, 0.6, 0.4), Some(1.5)),
         light(spot, Vec3::new(-0.1, 0.8, 0.6), Some(4.0)),
-        light(Emission::Directional { direction }, Vec3::ZERO, None),
+        light(LightKind::Directional { direction }, Vec3::ZERO, None),
     ];
     let pixel = |i: usize| {
         [

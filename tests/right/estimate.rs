@@ -6,8 +6,8 @@ use ppm_vk::internals::config::{EmissionChoice, Estimator, RenderConfig};
 use ppm_vk::internals::estimate::{ErrorEstimate, RelativeError, of_one_photon};
 use ppm_vk::internals::film::Image;
 use ppm_vk::internals::metrics::{compare, relative_errors};
-use ppm_vk::internals::scene::Emission;
 use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::LightKind;
 use ppm_vk::internals::scene::PunctualLight;
 
 use crate::document::{Document, clear, matte};
@@ -129,7 +129,7 @@ fn ground(half_side: f64, has_block: bool, shining: Shining) -> Subject {
     let mut subject = subject_under(document, Some(white));
     if shining == Shining::Sun {
         subject.scene.lights = vec![PunctualLight {
-            emission: Emission::Directional { direction: Vec3::NEG_Y },
+            kind: LightKind::Directional { direction: Vec3::NEG_Y },
             position: Vec3::ZERO,
             intensity: Vec3::splat(std::f32::consts::PI),
             extent: 0.0,

@@ -20,7 +20,7 @@ fn soften(subject: Subject, extent: f64) -> Subject {
     let mut scene = subject.scene;
     let scale = scene.normalisation.scale;
     for light in &mut scene.lights {
-        let is_sun = matches!(light.emission, ppm_vk::internals::scene::Emission::Directional { .. });
+        let is_sun = matches!(light.kind, ppm_vk::internals::scene::LightKind::Directional { .. });
         light.extent = if is_sun { extent } else { extent * scale };
     }
     Subject::of(scene)

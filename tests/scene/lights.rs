@@ -9,8 +9,8 @@ use ppm_vk::internals::loader::LightUnits;
 use ppm_vk::internals::loader::LoadOptions;
 use ppm_vk::internals::packing::EmissiveTriangle;
 use ppm_vk::internals::packing::PackedScene;
-use ppm_vk::internals::scene::Emission;
 use ppm_vk::internals::scene::Environment;
+use ppm_vk::internals::scene::LightKind;
 use ppm_vk::{LoadChoice, Remark};
 use serde_json::{Value, json};
 
@@ -171,24 +171,24 @@ fn punctual_lights_stand_where_their_nodes_are_and_shine_along_minus_z() {
     };
     // The bounds of what has triangles are centred half a unit up, and scaled by 1.
     let place = Vec3::new(0.0, 1.5, 0.0);
-    assert_eq!(point.emission, Emission::Point);
+    assert_eq!(point.kind, LightKind::Point);
     assert_eq!((point.position, point.intensity), (place, Vec3::new(8.0, 4.0, 2.0)));
     assert_eq!((point.range, spot.range, sun.range), (Some(3.0), None, None));
-    let Emission::Spot {
+    let LightKind::Spot {
         direction,
         inner,
         outer,
-    } = spot.emission
+    } = spot.kind
     else {
         panic!("{spot:?}");
     };
     assert!(direction.distance(Vec3::NEG_Y) < 1e-6 && spot.position == place);
     assert!((inner - (1.0 - 0.5_f64.cos())).abs() < 1e-7 && (outer - (1.0 - 1_f64.cos())).abs() < 1e-7);
-    let Emission::Directional { direction } = sun.emission else {
+    let LightKind::Directional { direction } = sun.kind else {
         panic!("{sun:?}");
     };
     assert!(direction.distance(Vec3::NEG_Y) < 1e-6 && sun.intensity == Vec3::splat(5.0));
-    let Emission::Spot { inner, outer, .. } = default_spot.emission else {
+    let LightKind::Spot { inner, outer, .. } = default_spot.kind else {
         panic!("{default_spot:?}");
     };
     assert!(inner == 0.0 && (outer - (1.0 - (PI / 4.0).cos())).abs() < 1e-7);

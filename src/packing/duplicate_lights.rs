@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use glam::Vec3;
 
 use super::EmissiveTriangle;
-use super::shine::Shine;
+use super::emission_distribution::EmissionDistribution;
 use crate::scene::Scene;
 
 /// Where a triangle lies, whichever of its corners comes first, what it is made of, and which way it looks if that matters.
@@ -29,15 +29,21 @@ fn place_of(scene: &Scene, triangle: u32) -> Place {
 
 /// Takes out those that lie where another one of their material shines evenly to the same sides. Returns, of each, which it is
 /// and which one stays: that of the last object, which is what rays meet.
-pub(crate) fn take_doubles(scene: &Scene, shining: &mut Vec<(EmissiveTriangle, Shine)>) -> Vec<[u32; 2]> {
+pub(crate) fn remove_duplicates(
+    scene: &Scene,
+    emissive: &mut Vec<(EmissiveTriangle, EmissionDistribution)>,
+) -> Vec<[u32; 2]> {
     let mut stay: HashMap<Place, u32> = HashMap::new();
-    let even = shining.iter().rev().filter(|(_, shine)| shine.columns == 1);
+    let even = emissive
+        .iter()
+        .rev()
+        .filter(|(_, distribution)| distribution.columns == 1);
     let with_those_that_stay = even.map(|(light, _)| {
         let stays = stay.entry(place_of(scene, light.triangle)).or_insert(light.triangle);
         [light.triangle, *stays]
     });
     let doubles: Vec<[u32; 2]> = with_those_that_stay.filter(|[light, stays]| light != stays).collect();
     let gone: HashSet<u32> = doubles.iter().map(|[light, _]| *light).collect();
-    shining.retain(|(light, _)| !gone.contains(&light.triangle));
+    emissive.retain(|(light, _)| !gone.contains(&light.triangle));
     doubles
 }

@@ -33,7 +33,7 @@ const MIDDLE: DVec2 = DVec2::splat(1.0 / 3.0);
 
 /// How a triangle shines.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Shine {
+pub(crate) struct EmissionDistribution {
     /// Mean factor of the emission, about.
     pub mean: f64,
     /// Parts along a side.
@@ -42,7 +42,7 @@ pub(crate) struct Shine {
     pub shares: Vec<f64>,
 }
 
-impl Shine {
+impl EmissionDistribution {
     const EVEN: Self = Self {
         mean: 1.0,
         columns: 1,
@@ -88,8 +88,9 @@ impl Shine {
             .iter()
             .flatten()
             .any(|level| level.is_coarse || level.columns > most_columns);
-        let shine = |level: Option<Level>| level.map_or(Self::EVEN, |level| Self::of(&level.coarsened(most_columns)));
-        (levels.into_iter().map(shine).collect(), is_coarse)
+        let distribution =
+            |level: Option<Level>| level.map_or(Self::EVEN, |level| Self::of(&level.coarsened(most_columns)));
+        (levels.into_iter().map(distribution).collect(), is_coarse)
     }
 
     fn of(level: &Level) -> Self {

@@ -21,7 +21,7 @@ const MOST_VISITS: usize = 1 << 13;
 const DOUBLED: u32 = 1 << 31;
 
 /// What lies in one place.
-pub(crate) struct Contacts {
+pub(crate) struct CoincidentFaces {
     /// Of each triangle: [`TOUCHED`], [`COINCIDENT`], [`BACKED`].
     pub flags: Vec<u32>,
     /// Whether some object has faces in one place that look to opposite sides.
@@ -29,12 +29,12 @@ pub(crate) struct Contacts {
 }
 
 /// Finds what lies in one place, wherever instances put it. A superset where dielectrics are concerned.
-pub(crate) fn contacts(
+pub(crate) fn coincident_faces(
     records: &[BvhRecord],
     triangles: &[ShadingTriangle],
     instances: &[Instance],
     materials: &[Material],
-) -> Contacts {
+) -> CoincidentFaces {
     let shared = instances.iter().map(|instance| instance.first_triangle).min();
     let own = &triangles[..shared.map_or(triangles.len(), |first| first as usize)];
     let scene = Scene {
@@ -47,7 +47,7 @@ pub(crate) fn contacts(
     let mut found: Vec<u32> = own
         .par_iter()
         .zip(&scene.faces)
-        .map(|(triangle, face)| face.contacts(&scene, triangle.material))
+        .map(|(triangle, face)| face.flags(&scene, triangle.material))
         .collect();
     found.resize(triangles.len(), 0);
     let mut placed: BTreeMap<(usize, usize), Vec<&Place>> = BTreeMap::new();
@@ -64,7 +64,7 @@ pub(crate) fn contacts(
         }
         let triangles = found.par_iter_mut().zip(&triangles[first..]);
         triangles.for_each(|(found, triangle)| {
-            let of_place = |place: &&Place| Face::new(triangle, Some(*place)).contacts(&scene, material);
+            let of_place = |place: &&Place| Face::new(triangle, Some(*place)).flags(&scene, material);
             *found = places.iter().map(of_place).fold(0, |all, of_one| all | of_one);
         });
     }
@@ -72,7 +72,7 @@ pub(crate) fn contacts(
     for found in &mut found {
         *found &= !DOUBLED;
     }
-    Contacts { flags: found, doubled }
+    CoincidentFaces { flags: found, doubled }
 }
 
 /// What may touch.
@@ -164,7 +164,7 @@ impl Face {
     }
 
     /// The flags of a triangle of this material, and [`DOUBLED`].
-    fn contacts(&self, scene: &Scene<'_>, material: u32) -> u32 {
+    fn flags(&self, scene: &Scene<'_>, material: u32) -> u32 {
         let mut found = 0;
         let all = if scene.is_dielectric(material) {
             TOUCHED | DOUBLED
@@ -188,7 +188,7 @@ impl Face {
                         .map_or((corner - uncertain, opposite + uncertain), |place: &Place| {
                             place.place_box(corner, opposite)
                         });
-                    if self.meets_box(corner, opposite) {
+                    if self.overlaps_box(corner, opposite) {
                         stack.push((low[3].to_bits(), place));
                     }
                 }
@@ -203,12 +203,12 @@ impl Face {
                 }
                 let other_material = scene.triangles[number].material;
                 found |= match place {
-                    None => self.contact(&scene.faces[number], scene, [material, other_material]),
+                    None => self.flags_beside(&scene.faces[number], scene, [material, other_material]),
                     Some(place) => {
                         let corners = [record.row0, record.row1, record.row2].map(xyz);
                         if self.is_near(corners.map(|corner| place.placement.point(corner)), place.reach) {
                             let other = Self::of_corners(corners, 0, Some(place));
-                            self.contact(&other, scene, [material, other_material])
+                            self.flags_beside(&other, scene, [material, other_material])
                         } else {
                             0
                         }
@@ -228,16 +228,16 @@ impl Face {
 
     /// Whether a box around corners meets this face's.
     fn is_near(&self, [a, b, c]: [Vec3; 3], reach: f32) -> bool {
-        self.meets_box(a.min(b).min(c) - reach, a.max(b).max(c) + reach)
+        self.overlaps_box(a.min(b).min(c) - reach, a.max(b).max(c) + reach)
     }
 
-    fn meets_box(&self, low: Vec3, high: Vec3) -> bool {
+    fn overlaps_box(&self, low: Vec3, high: Vec3) -> bool {
         let reach = Vec3::splat(self.reach);
         (self.low - reach).cmple(high).all() && (self.high + reach).cmpge(low).all()
     }
 
     /// What the other face adds to the flags.
-    fn contact(&self, other: &Self, scene: &Scene<'_>, materials: [u32; 2]) -> u32 {
+    fn flags_beside(&self, other: &Self, scene: &Scene<'_>, materials: [u32; 2]) -> u32 {
         let cosine = self.normal.dot(other.normal);
         let same_object = self.object == other.object;
         let see_through = scene.materials[materials[0] as usize].alpha_mode != OPAQUE;
@@ -253,9 +253,9 @@ impl Face {
         if others.surface == DIELECTRIC || !self.overlaps(other) {
             return 0;
         }
-        let shines_through = others.flags & BACK_EMITS != 0 && others.emission != [0.0; 3] && !same_object;
+        let emits_through = others.flags & BACK_EMITS != 0 && others.emission != [0.0; 3] && !same_object;
         let emits = others.emission != [0.0; 3];
-        match (same_object, cosine > 0.0 || shines_through) {
+        match (same_object, cosine > 0.0 || emits_through) {
             // Only where they emit it matters which of them is met.
             (true, false) if emits => DOUBLED | BACKED,
             (true, _) => DOUBLED,
@@ -267,7 +267,7 @@ impl Face {
     /// Whether the faces, which are parallel, can share a point: a superset of those that do.
     fn touches(&self, other: &Self) -> bool {
         let margin = Vec3::splat(other.place_reach);
-        if !self.meets_box(other.low - margin, other.high + margin) {
+        if !self.overlaps_box(other.low - margin, other.high + margin) {
             return false;
         }
         let height = |corner: &Vec3| other.normal.dot(*corner - other.corners[0]);
