@@ -1,4 +1,4 @@
-// A launch of more workgroups than a dimension may have is laid out in rows; the last row has some too many.
+// A launch of more workgroups than the limit of a dimension is laid out in rows; the last row may have surplus workgroups.
 
 uint workgroup_index() {
     return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;

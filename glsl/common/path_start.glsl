@@ -1,4 +1,4 @@
-// Photon paths as `emission` leaves them to `photons`. Include after random.glsl and settings.glsl.
+// Starts of photon paths: `emission` writes them, `photons` reads them. Include after random.glsl and settings.glsl.
 
 layout(push_constant) uniform Push {
     uint iteration;
@@ -8,7 +8,7 @@ layout(push_constant) uniform Push {
     uint path_count;
 } push;
 
-// Quadruples of its numbers that choose a path's start.
+// Quadruples of random numbers that a path's start takes.
 const uint START_NUMBERS = 2u;
 
 // Of a path of the batch.
@@ -16,7 +16,7 @@ Random random_of_path(uint path) {
     return random_of_photon(push.first_path + path, push.iteration, push.block, push.first_of_sequence, settings.seed);
 }
 
-// From a path's numbers to those of another one, after its start.
+// Continues with the random numbers of another path, after its start.
 void turn_to_path(inout Random random, uint path) {
     Random other = random_of_path(path);
     random.path = other.path;

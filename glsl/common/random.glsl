@@ -23,11 +23,11 @@ layout(constant_id = 5) const uint SAMPLER = 0u;
 
 #include "common/sobol.glsl"
 
-// What a path draws its numbers from.
+// The state of a path's random numbers.
 struct Random {
     uint path;      // pixel, or photon path within its iteration
     uint iteration;
-    uint seed;      // the user's, mixed with the kind of path
+    uint seed;      // the user's seed, mixed with the kind of path
     uint dimension; // how many quadruples have been drawn
     uint sequence;  // of low discrepancy: a pixel's own, or one of all photons
     uint block;     // of iterations whose numbers are one sequence
@@ -40,14 +40,14 @@ Random random_for(uint kind, uint path, uint iteration, uint block, uint sequenc
     return Random(path, iteration, mixed, 0u, sequence, block, index, mixed + iteration * 0x9e3779b1u + path);
 }
 
-// Of an iteration's paths of a pixel, or of what one of them leads to.
+// The camera path of a pixel in an iteration.
 struct CameraTurn {
     uint iteration;
     uint path;
     uint paths; // see config::RenderConfig::camera_paths
 };
 
-// For a pixel, or something else that has a path in each turn.
+// For a pixel, or another index that has one path in each turn.
 Random random_of_pixel(uint kind, uint pixel, CameraTurn turn, uint seed) {
     uint index = turn.iteration / SEQUENCES * turn.paths + turn.path;
     return random_for(kind, pixel, turn.iteration * turn.paths + turn.path, turn.iteration % SEQUENCES, pixel, index, seed);
@@ -58,18 +58,18 @@ Random random_of_photon(uint path, uint iteration, uint block, uint first, uint 
     return random_for(PHOTON_PATH, path, iteration, block, iteration % SEQUENCES, first + path, seed);
 }
 
-// For so many points of a disc. Several are a set of their own, later ones go on in one sequence.
+// For several points of a disc: they are one set; later sets continue one sequence.
 Random random_of_disc(uint slot, uint iteration, uint points, uint seed) {
     uint block = points > 1u ? iteration : 0xffffffffu;
     return random_for(COVERAGE_SAMPLE, slot, iteration, block, slot, points > 1u ? 0u : iteration, seed);
 }
 
-// For one of several samples that a path takes alike.
+// For one of several samples of the same kind in a path.
 Random sample_of(Random random, uint number, uint samples) {
     Random result = random;
     result.index = random.index * samples + number;
     result.dimension = SAMPLER == SOBOL ? 0u : number;
-    result.state += number * 0x85ebca6bu; // a stream of its own
+    result.state += number * 0x85ebca6bu; // a separate stream
     return result;
 }
 
@@ -79,13 +79,13 @@ vec4 unit_floats(uvec4 bits) {
 }
 
 // The paper's «classic congruential generator», with the constants of Press and others, «Numerical Recipes», 1992. Its
-// neighbouring streams are correlated: for comparison alone.
+// neighbouring streams are correlated: only for comparison.
 uint congruential(inout uint state) {
     state = state * 1664525u + 1013904223u;
     return state;
 }
 
-// A number that belongs to something at the path's present place: whenever it is asked for there, it is the same.
+// A number for a thing at the path's current dimension: the same whenever it is drawn there.
 float number_of(Random random, uvec2 thing) {
     return unit_floats(pcg4d(uvec4(random.path ^ 0x616c7068u, random.iteration + thing.y * 0x85ebca6bu,
                                    random.seed + thing.x * 0x9e3779b9u, random.dimension))).x;

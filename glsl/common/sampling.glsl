@@ -56,7 +56,7 @@ uint encode_direction(vec3 d) {
     return packSnorm2x16(p);
 }
 
-// A vector along the coded direction, of length 1/√3 to 1: enough where only the sign of a cosine matters.
+// A vector along the encoded direction, of length 1/√3 to 1: sufficient if only the sign of a cosine matters.
 vec3 decode_octahedral(uint code) {
     vec2 p = unpackSnorm2x16(code);
     float z = 1.0 - abs(p.x) - abs(p.y);

@@ -1,5 +1,5 @@
 // Sobol' points in four dimensions with Owen's scrambling: Burley, «Practical Hash-based Owen Scrambling», JCGT 10(1),
-// 2020. Words are kept with their bits reversed, the highest digit lowest, where that saves reversing them.
+// 2020. Words have their bits reversed, the highest digit lowest, where that saves reversals.
 
 // The columns of the generator matrices for one digit of the index: Joe and Kuo, «Constructing Sobol sequences with better
 // two-dimensional projections», 2008. The first dimension's is the unit matrix.
@@ -44,7 +44,7 @@ uvec3 sobol_reversed(uint index) {
     return p;
 }
 
-// Each bit is flipped or not, depending on the bits below it: of reversed words, Owen's scrambling. The hash is that of
+// Each bit is flipped or not, depending on the bits below it: for reversed words this is Owen's scrambling. The hash is that of
 // Laine and Karras with Vegdahl's constants.
 uvec4 scramble_reversed(uvec4 p, uvec4 seed) {
     p ^= p * 0x3d20adeau;
@@ -55,8 +55,8 @@ uvec4 scramble_reversed(uvec4 p, uvec4 seed) {
     return p;
 }
 
-// A point of a sequence: `seed` is that of the sequence's four dimensions. The index is scrambled as well, so that sets of
-// four dimensions with other seeds have nothing to do with each other, though each stays a low-discrepancy sequence.
+// A point of a sequence: `seed` is that of the sequence's four dimensions. The index is scrambled as well, so that sets of four
+// dimensions with different seeds are independent, while each remains a low-discrepancy sequence.
 uvec4 sobol_point(uint index, uvec4 seed) {
     uint order = seed.x ^ (seed.y << 16u | seed.y >> 16u);
     uint shuffled = bitfieldReverse(scramble_reversed(uvec4(bitfieldReverse(index)), uvec4(order)).x);

@@ -1,5 +1,5 @@
-// A stable radix sort of up to 8 bits a pass. A pass counts the digits of each tile (`sort_count`), sums up each digit's counts over
-// the tiles (`sort_rows`) and puts each key into its place (`sort_scatter`).
+// A stable radix sort with up to 8 bits per pass. A pass counts the digits of each tile (`sort_count`), computes prefix sums of
+// each digit's counts over the tiles (`sort_rows`) and moves each key to its place (`sort_scatter`).
 
 #include "layout.glsl"
 
@@ -21,7 +21,7 @@ uint digits() {
     return 1u << push.bits;
 }
 
-// Where a digit's count of a tile is, and past the last tile that of all.
+// Index of a digit's count in a tile; behind the last tile, of its total.
 uint histogram_of(uint digit, uint tile) {
     return digit * (push.tiles + 1u) + tile;
 }

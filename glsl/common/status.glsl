@@ -1,4 +1,4 @@
-// What the stages report to the host. Counters add up until the host clears them.
+// Status that the stages report to the host. Counters add up until the host clears them.
 #include "layout.glsl"
 
 layout(std430) buffer Status { StatusCounters status; };

@@ -1,4 +1,4 @@
-// Texel buffers: four words a fetch, which some drivers do several times faster than four loads from a storage buffer.
-// (Macros, since a texel buffer that is passed to a function escapes the reflection.)
+// Texel buffers: four words per fetch, on some drivers several times faster than four loads from a storage buffer. (Macros,
+// because reflection does not see a texel buffer that is passed to a function.)
 #define TEXEL(buffer, i) uintBitsToFloat(texelFetch(buffer, int(i)))
 #define TEXEL_BITS(buffer, i) texelFetch(buffer, int(i))

@@ -1,4 +1,4 @@
-// Sums that stay right over 10⁹ additions: a value is kept as high + low, two f32 that don't overlap.
+// Sums that stay accurate over 10⁹ additions: a value is high + low, two f32 that do not overlap.
 
 // a + b exactly: Knuth's two-sum.
 void two_sum(float a, float b, out float sum, out float rest) {
@@ -16,7 +16,7 @@ void add_to(inout float high, inout float low, float value) {
     two_sum(sum, rest + low, high, low);
 }
 
-// Multiplies by 1 − part; `rest` is 1 − part, computed apart. Whichever is small keeps its precision.
+// Multiplies by 1 − part; `rest` is 1 − part, computed separately. Whichever is small keeps its precision.
 void reduce_by(inout float high, inout float low, float part, float rest) {
     if (part < 0.5) {
         add_to(high, low, -(high * part) - low * part);

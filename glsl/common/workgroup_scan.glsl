@@ -1,6 +1,6 @@
-// Exclusive prefix sum over the invocations of a workgroup, by groups of eight: two sums of few numbers each take fewer
-// barriers than doubling distances, and CPU devices pay for those. Uses no subgroup operation: subgroups have 8 to 128
-// invocations, depending on the device.
+// Exclusive prefix sum over the invocations of a workgroup, by groups of eight: this takes fewer barriers than doubling
+// distances, and barriers are expensive on CPU devices. Uses no subgroup operations: subgroups have 8 to 128 invocations,
+// depending on the device.
 
 const uint SCAN_GROUP = 8u;
 
@@ -10,7 +10,7 @@ shared uint workgroup_scan_groups[gl_WorkGroupSize.x / SCAN_GROUP];
 uint workgroup_exclusive_scan(uint value, out uint total) {
     uint me = gl_LocalInvocationID.x;
     uint group = me / SCAN_GROUP;
-    // What a call before has read of either array lies a barrier before this one's writes to it.
+    // A barrier separates the reads of a previous call from this call's writes to the same array.
     workgroup_scan_values[me] = value;
     barrier();
     uint before = 0u;

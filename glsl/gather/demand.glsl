@@ -1,7 +1,6 @@
-// What visible points want of photons at each place: a hashed table of cells. Include after grid.glsl.
-//
-// The cells are coarser than those that photons are gathered from, so that a disc reaches few of them, and each object has
-// its own. Places that share an entry by chance keep photons that nobody wants: that costs time, not truth.
+// Demand of the visible points for photons: a hashed table of cells. Include after grid.glsl. The cells are coarser than those of
+// the gather, so that a disc reaches few of them, and each object has its own. A hash collision keeps photons needlessly: that
+// costs time, but no accuracy.
 
 uint demand_entry(ivec3 cell, uint of_shell, uint object) {
     uvec3 c = uvec3(cell);

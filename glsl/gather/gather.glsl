@@ -1,8 +1,8 @@
-// What all gathers share. Include after photon.glsl, visible_point.glsl and statistics.glsl.
+// Common parts of all gathers. Include after photon.glsl, visible_point.glsl and statistics.glsl.
 
 #include "bsdf/reflection.glsl"
 
-// Whether the photons tested are counted, for reports.
+// Whether tests of photons are counted, for reports.
 layout(constant_id = 0) const bool COUNT_TESTS = false;
 
 uniform usamplerBuffer VisiblePoints;
@@ -11,11 +11,11 @@ uniform usamplerBuffer GlossOf;
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot and map, and GATHERED_FOR, where they are counted
 
-// The gather's side of a visible point.
+// A visible point as gathers need it.
 struct Receiver {
     vec3 position;
     float radius2;
-    uint object; // with its map's bit, as photons have it; NO_OBJECT where there is no visible point
+    uint object; // with its map's bit, like a photon's; NO_OBJECT if there is no visible point
     vec3 normal; // of any length
     VisibleBsdf bsdf;
 };
@@ -48,7 +48,7 @@ float squared_distance(vec3 a, vec3 b) {
     return d2;
 }
 
-// The one predicate of every gather: on the same object, of the same map, within R, and arriving on the side that the viewer sees.
+// The predicate of all gathers: on the same object, of the same map, within R, and arriving on the visible side.
 bool accepts(Receiver receiver, Photon photon, out float distance2) {
     precise float cosine = dot(decode_octahedral(floatBitsToUint(photon.flux_direction.w)), receiver.normal);
     distance2 = squared_distance(photon.position_object.xyz, receiver.position);
@@ -57,7 +57,7 @@ bool accepts(Receiver receiver, Photon photon, out float distance2) {
            cosine < 0.0;
 }
 
-// A receiver's part of this launch.
+// A receiver's sums in this launch.
 struct Sum {
     vec3 flux;
     uint count;
@@ -72,7 +72,7 @@ void gather(Receiver receiver, Photon photon, inout Sum sum) {
     bool accepted = accepts(receiver, photon, distance2);
     vec3 flux = photon.flux_direction.rgb;
     if (carries_bsdf()) {
-        // What is summed up is what the surface scatters to the viewer.
+        // The sum is the light that the surface scatters to the viewer.
         flux *= accepted ? gathered_part(receiver.bsdf, floatBitsToUint(photon.flux_direction.w)) : vec3(0.0);
     }
     sum.flux += accepted ? flux : vec3(0.0);

@@ -1,11 +1,10 @@
-// Hashed uniform grids: cells of one size, as many as space needs, that share a table of 2^cell_bits buckets. A block of
-// 16×4×4 cells lies together in the table and each of its rows of 16 cells along x is contiguous, so that the photons of
-// neighbouring cells of a row are one range of the sorted photons.
-//
-// Radii grow with the distance from the camera, as footprints do. So space is divided into shells around it, each four times
-// as large as the one within, and each shell of each photon map has a grid of its own cell size. Include after settings.glsl.
+// Hashed uniform grids: unbounded grids of cells of one size that share a table of 2^cell_bits buckets. A block of 16×4×4 cells
+// is contiguous in the table, and so is each of its rows of 16 cells along x, so that the photons of neighbouring cells of a row
+// are one range of the sorted photons. Radii grow with the distance from the camera, like footprints. So space is divided into
+// shells around the camera, each four times as large as the one inside, and each shell of each photon map has a grid with its own
+// cell size. Include after settings.glsl.
 
-// The shell at a squared distance from the camera. Render space is 2 long: what is farther away than 4 is in the outermost.
+// The shell at a squared distance from the camera. Render space is 2 wide: distances above 4 are in the outermost shell.
 uint shell_at(float distance2) {
     int exponent = int(floatBitsToUint(distance2) >> 23u) - 127;
     return uint(clamp((exponent + 28) >> 2, 0, int(SHELLS) - 1));
@@ -20,7 +19,7 @@ uint shell_of(vec3 position) {
 // The first and the last shell that a ball reaches.
 uvec2 shells_of(vec3 position, float radius) {
     float distance = length(position - settings.camera_position.xyz);
-    float slack = 1e-6 * (distance + radius); // more than both ends are rounded
+    float slack = 1e-6 * (distance + radius); // more than the rounding of both ends
     float nearest = max(distance - radius - slack, 0.0);
     float farthest = distance + radius + slack;
     return uvec2(shell_at(nearest * nearest), shell_at(farthest * farthest));

@@ -8,7 +8,7 @@ void update_statistics(inout Statistics statistics, vec4 new_flux, uint new_phot
     if (new_photons == 0u) {
         return;
     }
-    // (N + αM) / (N + M), and what it lacks to 1, with N = α · accepted.
+    // (N + αM) / (N + M), and 1 minus that, with N = α · accepted.
     float n = alpha * count_of(statistics.accepted_low, statistics.accepted_high);
     float m = float(new_photons);
     float rest = (n + alpha * m) / (n + m);

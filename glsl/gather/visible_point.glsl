@@ -1,7 +1,7 @@
-// Where visible points lie. Include after settings.glsl.
+// The order of visible points. Include after settings.glsl.
 
-// Visible points are kept in the order of 8×8 tiles of pixels, each 4×2 of a tile together: neighbours in the picture
-// are neighbours in memory. The picture's edge leaves slots unused.
+// Visible points are stored in 8×8 tiles of pixels, 4×2 inside a tile: neighbours in the picture are neighbours in memory. At the
+// picture's edge, slots are unused.
 uvec2 pixel_of(uint pixel_slot) {
     uint tiles_across = (settings.resolution.x + TILE - 1u) / TILE;
     uint tile = pixel_slot / (TILE * TILE);
@@ -19,7 +19,7 @@ uint slots() {
     return pixel_slots() * settings.slots_per_pixel;
 }
 
-// What gathers photons: each slot for each photon map, map-major.
+// Receivers of photons: each slot for each photon map, map-major.
 uint receiver_count() {
     return slots() * settings.photon_maps;
 }

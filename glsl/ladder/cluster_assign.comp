@@ -13,7 +13,7 @@ layout(local_size_x = 64) in;
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer Centroids;
 layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };
-layout(std430) writeonly buffer ClusterOf { uint cluster_of[]; }; // of each place; NO_SLOT for a filler
+layout(std430) writeonly buffer ClusterOf { uint cluster_of[]; }; // of each position; NO_SLOT for a filler
 
 void main() {
     uint place = invocation_index();

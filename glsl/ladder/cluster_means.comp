@@ -33,6 +33,6 @@ void main() {
     }
     centroids[cluster] = vec4(before.xyz + offset / float(max(count, 1u)), before.w);
     cluster_sizes[cluster] = count;
-    // With the fillers that keep a workgroup from holding points of two clusters.
+    // Including fillers, so that no workgroup has points of two clusters.
     padded_sizes[cluster] = (count + GROUP - 1u) / GROUP * GROUP;
 }

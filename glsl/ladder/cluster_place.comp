@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Puts the visible points cluster by cluster, in the order that they had, with fillers in between.
+// Orders the visible points by cluster, stably, with fillers in between.
 
 layout(local_size_x = 64) in;
 

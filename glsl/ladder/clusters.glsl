@@ -9,7 +9,7 @@ layout(push_constant) uniform Push {
     uint runs;
 } push;
 
-// First and end of the runs in whose reach a run lies.
+// First and end of the runs whose points may join a run's cluster.
 uvec2 window_of(uint run) {
     return uvec2(run - min(run, WINDOW), min(run + WINDOW + 1u, push.runs));
 }

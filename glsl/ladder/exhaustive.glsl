@@ -1,18 +1,17 @@
-// What the gathers share that test every photon, or every photon of a mesh. Include after gather.glsl and
-// point_groups.glsl.
+// Common parts of the gathers that test every photon, or every photon of a mesh. Include after gather.glsl and point_groups.glsl.
 
-// Visible points in the order of PointOrder, whose workgroups have one mesh each; otherwise in that of their slots.
+// Visible points in the order of PointOrder, whose workgroups have one mesh each; otherwise in the order of slots.
 layout(constant_id = 1) const bool ORDERED = false;
-// Photons sorted by mesh, of which a visible point tests its own mesh's.
+// Photons are sorted by mesh; a visible point tests those of its own mesh.
 layout(constant_id = 2) const bool BY_MESH = false;
-// Photons beyond R are sorted out by the built-in distance() instead of a squared distance.
+// Photons beyond R are rejected by the built-in distance() instead of a squared distance.
 layout(constant_id = 3) const bool DISTANCE = false;
 
 layout(push_constant) uniform Push {
     uint first;  // the photons of this launch: drivers cut long loops
     uint end;
-    uint stride; // only every stride-th group of visible points is gathered for: 1 but in a bench
-    uint groups; // that are gathered for
+    uint stride; // only every stride-th group of visible points is processed: 1 except in benches
+    uint groups; // number of groups that are processed
     uint factor; // see group_of_workgroup
     uint map;    // of photons
 } push;
@@ -20,7 +19,7 @@ layout(push_constant) uniform Push {
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
 layout(std430) readonly buffer MeshEnds { uint mesh_ends[]; }; // one past each mesh's last photon
 
-// Slot of the visible point at a place of this workgroup; NO_SLOT for a filler.
+// Slot of the visible point at a position of this workgroup; NO_SLOT for a filler.
 uint slot_at(uint place) {
     uint group = group_of_workgroup(push.groups, push.factor);
     if (group == NO_SLOT) {
@@ -48,7 +47,7 @@ uvec2 photons_to_test(uint object) {
 }
 
 void test(Receiver receiver, float radius, Photon photon, inout Sum sum) {
-    // The built-in rounds as it likes; the margin leaves the last word to the predicate that all methods share.
+    // The rounding of the built-in is unspecified; the margin leaves the decision to the common predicate.
     bool far = DISTANCE ? distance(photon.position_object.xyz, receiver.position) > radius * 1.00001 : false;
     if (!far) {
         gather(receiver, photon, sum);

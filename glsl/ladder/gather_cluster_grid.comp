@@ -17,7 +17,7 @@ layout(local_size_x = 64) in;
 #include "trace/object_grid.glsl"
 #include "common/status.glsl"
 
-// The part of the sorted photons that this launch looks at.
+// The part of the sorted photons that this launch tests.
 layout(push_constant) uniform Push {
     uint first;
     uint end;
@@ -77,7 +77,7 @@ void main() {
             }
         }
     }
-    // Loops that didn't reach their end were cut by the driver: the gather is done again in smaller parts.
+    // Loops that did not reach their end were cut by the driver: the gather is repeated in smaller parts.
     if (tested != to_test || rows != (high.y - low.y + 1u) * (high.z - low.z + 1u)) {
         atomicOr(status.again, GATHERS_TOO_LONG);
     }

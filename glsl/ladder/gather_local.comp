@@ -35,7 +35,7 @@ void main() {
         atomicAdd(receivers, 1u);
     }
     barrier();
-    // The whole workgroup stages the same photons: all, or those of the mesh of its first visible point and so of all.
+    // The whole workgroup stages the same photons: all, or those of its mesh, which is that of its first visible point.
     uint object = 0u;
     if (BY_MESH) {
         uint first_slot = slot_at(0u);

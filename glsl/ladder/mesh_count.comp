@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The paper's photon sorting, first stage: how many photons lie on each mesh.
+// The paper's photon sorting, first stage: counts the photons on each mesh.
 
 layout(local_size_x = 64) in;
 

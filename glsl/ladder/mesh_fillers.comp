@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The paper's filler hitpoints: how many each mesh needs so that its last workgroup is full.
+// The paper's filler hitpoints: the number that each mesh needs to fill its last workgroup.
 
 layout(local_size_x = 64) in;
 

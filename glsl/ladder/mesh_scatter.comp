@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The paper's photon sorting, last stage: each photon takes the next place of its mesh from an atomic counter. Photons of
-// a mesh come in any order, another one each run.
+// The paper's photon sorting, last stage: each photon takes the next place of its mesh from an atomic counter. The order of
+// photons within a mesh is undefined and differs between runs.
 
 layout(local_size_x = 64) in;
 
@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 
 uniform usamplerBuffer Photons;
 layout(std430) readonly buffer PhotonCount { uint photon_count; };
-layout(std430) buffer MeshEnds { uint mesh_ends[]; }; // first each mesh's first place, in the end its end
+layout(std430) buffer MeshEnds { uint mesh_ends[]; }; // initially each mesh's first position, finally its end
 layout(std430) writeonly buffer SortedPhotons { Photon sorted_photons[]; };
 
 void main() {

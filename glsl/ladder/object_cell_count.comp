@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The paper's grid of each object: how many photons lie in each cell.
+// The paper's grid of each object: counts the photons in each cell.
 
 layout(local_size_x = 64) in;
 

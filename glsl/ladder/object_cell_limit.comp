@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The paper's maximum of photons a cell: what is beyond it gets no place, and is counted as lost.
+// The paper's maximum number of photons per cell: photons beyond it are dropped and counted as lost.
 
 layout(local_size_x = 64) in;
 

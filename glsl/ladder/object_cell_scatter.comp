@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The paper's grid of each object: each photon takes the next place of its cell from an atomic counter. Photons of a cell
-// come in any order, another one each run.
+// The paper's grid of each object: each photon takes the next place of its cell from an atomic counter. The order of photons
+// within a cell is undefined and differs between runs.
 
 layout(local_size_x = 64) in;
 
@@ -24,7 +24,7 @@ void main() {
     ObjectGrid grid = object_grid(object_of(photon.position_object));
     uint cell = cell_number(grid, cell_in(grid, photon.position_object.xyz));
     uint place = cell_starts[cell] + atomicAdd(cursors[cell], 1u);
-    // A full cell has no place left.
+    // The cell is full.
     if (place < cell_starts[cell + 1u]) {
         sorted_photons[place] = photon;
     }

@@ -16,7 +16,7 @@ layout(std430) writeonly buffer PointKeys { uint keys[]; };
 layout(std430) writeonly buffer PointValues { uint values[]; };
 layout(std430) writeonly buffer PointCount { uint point_count; };
 
-// Two zero bits after each of the six.
+// Inserts two zero bits after each of the six bits.
 uint spread(uint v) {
     v = (v | v << 8u) & 0x0300fu;
     v = (v | v << 4u) & 0x030c3u;

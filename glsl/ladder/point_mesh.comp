@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Ordering of visible points: keys are their meshes; counts how many each mesh has.
+// Ordering of visible points: keys are their meshes; counts the points of each mesh.
 
 layout(local_size_x = 64) in;
 
@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 #include "settings.glsl"
 #include "gather/visible_point.glsl"
 
-// Whether the points have an order already, which equal keys are to keep.
+// Whether the points are ordered already; equal keys keep that order.
 layout(constant_id = 0) const bool PRESORTED = false;
 
 layout(push_constant) uniform Push {

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Ordering of visible points, last stage: moves them to their places, past the fillers of the meshes before.
+// Ordering of visible points, last stage: moves them to their places, after the fillers of the previous meshes.
 
 layout(local_size_x = 64) in;
 

@@ -1,8 +1,8 @@
-// What photon paths are aimed at, at their start and where they bounce.
+// Aiming of photon paths, at their start and at bounces.
 #ifndef LIGHTS_AIM
 #define LIGHTS_AIM
 
-// Paths are aimed at what was found to be worth it, or start in proportion to the lights' power.
+// Paths start by a learned table, or else in proportion to the lights' power.
 layout(constant_id = 24) const bool AIMED = false;
 
 #include "lights/emission_table.glsl"
@@ -22,9 +22,9 @@ Cone cone_of(vec4 sphere, vec3 from) {
     return Cone(inside ? vec3(0.0, 0.0, 1.0) : way * inversesqrt(distance2), inside ? 2.0 : versine);
 }
 
-// From a matte surface outside of what the camera sees hardly a photon finds there, and those that do carry the flux of all:
-// half of them are aimed there. Gives the direction in place of the cosine's, and what the flux is to be weighed with: cosine
-// over the density of both ways together, at most 2.
+// Few photons from a matte surface outside of the view reach the view, and each of those carries much flux. So half of them are
+// aimed at it. Replaces the cosine-distributed direction and returns the weight of the flux: cosine distribution over the density
+// of both strategies together, at most 2.
 float guide(vec3 position, vec3 normal, vec4 u, inout vec3 outgoing) {
     EmissionTableSize size = emission_table_size();
     float weight = 1.0;

@@ -3,19 +3,19 @@
 #ifndef LIGHTS_ALIAS_TABLE
 #define LIGHTS_ALIAS_TABLE
 
-// A cell of a table, and how far into it a number lies.
+// A cell of a table, and the position of a number within it.
 struct AliasPlace {
     uint cell;
     float within;
 };
 
-// What was chosen, and what is left of the number that chose it, uniform in [0, 1].
+// The chosen index, and the remainder of the number that chose it, uniform in [0, 1].
 struct Choice {
     uint index;
     float rest;
 };
 
-// u has 24 bits, and the two `digits` below it as many again: what has one chance in 10¹² is then chosen as often as it
+// u and each of the two `digits` below it have 24 bits, so that an index with a probability of 10⁻¹² is chosen as often as it
 // should be.
 AliasPlace alias_place(uint count, float u, vec2 digits) {
     uvec3 bits = uvec3(vec3(u, digits) * 16777216.0);
@@ -28,7 +28,7 @@ AliasPlace alias_place(uint count, float u, vec2 digits) {
                       float(part) * (1.0 / 4294967296.0) + float(lower_part) * (1.0 / 4294967296.0 / 4294967296.0));
 }
 
-// `accept`: the part of the cell that chooses what has its number; `alias`: what the rest of it chooses.
+// `accept`: the part of the cell that chooses the cell's own index; `alias`: the index that the rest of it chooses.
 Choice alias_choice(AliasPlace place, float accept, uint alias) {
     bool own = place.within < accept || accept >= 1.0;
     float rest = own ? place.within / accept : (place.within - accept) / (1.0 - accept);

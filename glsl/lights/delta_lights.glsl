@@ -1,12 +1,12 @@
-// Lights that are no surfaces, which no direction of a BSDF meets: what followed lobes show of them, by a ray to one, and what a ray
-// sees of those that have an extent. Include after common/random.glsl.
+// Delta lights, which no BSDF sample hits: their contribution to lobes that camera paths follow, by a ray to a light; and the
+// radiance along a ray of punctual lights with an extent. Include after common/random.glsl.
 #ifndef LIGHTS_DELTA_LIGHTS
 #define LIGHTS_DELTA_LIGHTS
 
 #include "bsdf/bsdf.glsl"
 #include "lights/light.glsl"
 
-// A ray that asks whether a light is seen, and what it brings if it is.
+// A shadow ray to a light, and the light's contribution if it is visible.
 struct LightRay {
     vec3 origin;
     vec3 direction;
@@ -16,11 +16,11 @@ struct LightRay {
 
 const LightRay NO_LIGHT_RAY = LightRay(vec3(0.0), vec3(0.0), 0.0, vec3(0.0));
 
-bool asks_light(LightRay ray) {
+bool contributes(LightRay ray) {
     return PUNCTUAL_LIGHTS && largest(ray.contribution) > 0.0;
 }
 
-// What a followed lobe shows of a light.
+// The contribution of a light to a followed lobe.
 LightRay ray_to_light(uint index, vec2 place, SurfaceInteraction met, vec3 viewer) {
     Light light = light_at(index);
     LightRay result = NO_LIGHT_RAY;
@@ -39,12 +39,12 @@ LightRay ray_to_light(uint index, vec2 place, SurfaceInteraction met, vec3 viewe
     return result;
 }
 
-// Whether lights that are points show in what is followed.
+// Whether delta lights contribute to the followed lobe.
 bool shows_delta_lights(Material material) {
     return PUNCTUAL_LIGHTS && has_width(material);
 }
 
-// Numbers for it, apart from the path's own: those are the same where there is nothing to ask.
+// Random numbers of their own: the path's numbers do not depend on whether a light is sampled.
 float delta_light_number(Random random, uint i) {
     return number_of(random, uvec2(i, GLINT));
 }
@@ -57,7 +57,7 @@ vec2 delta_light_place(Random random) {
     return place;
 }
 
-// To a light by chance.
+// To a light chosen at random.
 LightRay sample_delta_light(SurfaceInteraction met, vec3 viewer, Random random) {
     vec2 digits = vec2(delta_light_number(random, 1u), delta_light_number(random, 2u));
     uint chosen = choose_light(delta_light_number(random, 0u), digits).index;
@@ -66,13 +66,13 @@ LightRay sample_delta_light(SurfaceInteraction met, vec3 viewer, Random random) 
     return ray;
 }
 
-// By a ray to each light, where visible points are found once.
+// By a ray to each light, for estimators that find visible points once.
 vec3 all_delta_lights(SurfaceInteraction met, vec3 viewer, Random random) {
     vec3 sum = vec3(0.0);
-    // Triangles come first, and may be many.
+    // Triangles come first in the table, and may be many.
     for (uint i = settings.light_count; i > 0u && light_at(i - 1u).kind != TRIANGLE_LIGHT && !loops_cut; i--) {
         LightRay ray = ray_to_light(i - 1u, delta_light_place(random), met, viewer);
-        if (asks_light(ray)) {
+        if (contributes(ray)) {
             Hit hit = trace_visible(ray.origin, ray.direction, AT_ORIGIN, ray.end, NO_TRIANGLE, true, random);
             sum += hit.triangle == MISS ? ray.contribution : vec3(0.0);
         }
@@ -80,7 +80,8 @@ vec3 all_delta_lights(SurfaceInteraction met, vec3 viewer, Random random) {
     return sum;
 }
 
-// Radiance of lights with an extent that a ray meets within `end` lengths of its unit direction. They follow after the triangles.
+// Radiance of the lights with an extent that a ray hits within `end` lengths of its unit direction. They follow the triangles in
+// the table.
 vec3 soft_lights_along(vec3 origin, vec3 direction, float end, uint medium) {
     vec3 sum = vec3(0.0);
     if (SOFT_LIGHTS) {

@@ -1,4 +1,4 @@
-// What leaves the lights: where photon paths start. Include after common/random.glsl.
+// Emission: the start of photon paths. Include after common/random.glsl.
 #ifndef LIGHTS_EMISSION
 #define LIGHTS_EMISSION
 
@@ -11,24 +11,24 @@ struct Emission {
     vec3 origin;
     vec3 direction;
     vec3 flux;
-    PlacedTriangle ignored; // the triangle that it leaves
+    PlacedTriangle ignored; // the triangle that the ray leaves
     float inverse_range; // of a punctual light
 };
 
-// What paths are to pass through.
+// What a path has to pass through.
 struct Target {
-    bool everything; // that the light shines on
+    bool everything; // no restriction
     vec4 sphere;
 };
 
 const Target EVERYTHING = Target(true, vec4(0.0));
 
-// A start, and what is to be known of it to tell which targets it meets.
+// A start, and the data that decide which targets its ray hits.
 struct AimedStart {
     Emission emission;
     vec3 passed;    // a point of the ray
-    bool from_afar; // that has no beginning
-    bool on_target; // by the way it was chosen
+    bool distant; // a line without origin: parallel light or environment
+    bool on_target; // known from the sampling strategy
 };
 
 // A direction around an axis, with 1 − cos of the angle between them.
@@ -38,8 +38,8 @@ vec3 direction_off(vec3 axis, float versine, float turn) {
     return normalize(basis(axis) * vec3(across * cos(phi), across * sin(phi), 1.0 - versine));
 }
 
-// 1 − cos of a photon's angle from a spot's axis, such that all photons have the same flux, and the solid angle that would
-// have the whole intensity: the integral of the squared ramp is a third of its width.
+// 1 − cos of a photon's angle from a spot's axis, sampled so that all photons have the same flux, and the solid angle that gives
+// the same flux at full intensity: the integral of the squared ramp is a third of its width.
 float spot_versine(Light light, float u, out float solid_angle) {
     float ramp = light.outer - light.inner;
     float whole = light.inner + ramp / 3.0;
@@ -49,9 +49,9 @@ float spot_versine(Light light, float u, out float solid_angle) {
                                      : whole - from_outside;
 }
 
-// From a disc across the rays that covers the target, or the scene, where rays of many directions come from afar.
-AimedStart emit_from_afar(vec3 towards, vec3 irradiance, float area, vec2 place, Target target) {
-    // The sphere around the scene has the disc across the light that `area` is.
+// Distant light of many directions: from a disc across the ray that covers the target, or the scene.
+AimedStart emit_distant(vec3 towards, vec3 irradiance, float area, vec2 place, Target target) {
+    // `area` is that of the scene's bounding sphere across the ray.
     float scene_radius = sqrt(area / PI);
     float radius = target.everything ? scene_radius : target.sphere.w;
     vec3 passed = target.sphere.xyz + basis(-towards) * vec3(radius * disc_point(place), 0.0);
@@ -60,12 +60,12 @@ AimedStart emit_from_afar(vec3 towards, vec3 irradiance, float area, vec2 place,
     return AimedStart(Emission(origin, -towards, irradiance * disc, NO_TRIANGLE, 0.0), passed, true, true);
 }
 
-// From a disc across the rays that covers the target, or the scene.
+// Parallel light: from a disc across the rays that covers the target, or the scene.
 AimedStart emit_directional(Light light, vec2 place, vec2 turn, Target target) {
     AimedStart start;
     if (SOFT_LIGHTS && light.extent > 0.0) {
         vec3 towards = direction_in_cone(-light.direction, light.extent, turn);
-        start = emit_from_afar(towards, light.intensity, light.area, place, target);
+        start = emit_distant(towards, light.intensity, light.area, place, target);
     } else {
         vec3 centre = target.everything ? light.position : target.sphere.xyz;
         float radius = target.everything ? sqrt(light.area / PI) : target.sphere.w;
@@ -85,14 +85,14 @@ AimedStart emit_directional(Light light, vec2 place, vec2 turn, Target target) {
 
 AimedStart emit_environment(float area, vec2 place, vec2 direction, Target target) {
     vec3 towards;
-    EnvironmentSample sky = sample_environment(direction, towards);
-    return emit_from_afar(towards, sky.radiance / sky.density, area, place, target);
+    EnvironmentSample environment = sample_environment(direction, towards);
+    return emit_distant(towards, environment.radiance / environment.density, area, place, target);
 }
 
 AimedStart emit_point(Light light, vec2 place, vec2 u, Target target) {
     Cone cone = Cone(vec3(0.0, 0.0, 1.0), 2.0);
     if (!target.everything) {
-        // Rays from anywhere on the light's disc.
+        // Rays start anywhere on the light's disc.
         cone = cone_of(target.sphere + vec4(vec3(0.0), SOFT_LIGHTS ? light.extent : 0.0), light.position);
     }
     float solid_angle = 2.0 * PI * cone.versine;
@@ -141,7 +141,7 @@ AimedStart emit_triangle(Light light, vec2 place, vec2 u, float side, Target tar
     vec3 way = target.sphere.xyz - origin;
     bool in_cone = !target.everything && target.sphere.w * target.sphere.w < WIDE_CONE * dot(way, way);
     vec3 direction;
-    float projected; // solid angle times cosine, of directions as dense as this one
+    float projected; // cosine over the density of the direction
     if (in_cone) {
         Cone cone = cone_of(target.sphere, origin);
         direction = direction_in_cone(cone.axis, cone.versine, u);
@@ -171,12 +171,12 @@ AimedStart emit_from(uint index, vec2 place, vec2 direction, float side, Target 
     return start;
 }
 
-// A path without flux where another target comes before the one that it was chosen for.
+// The path has no flux if its ray hits another target before the one that it was chosen for.
 Emission emit_aimed(vec4 u, vec4 w, out uint light) {
     EmissionTableSize size = emission_table_size();
     Start start = choose_start(size, u, w);
     light = start.light;
-    // Of those without a weight none is to be traced, see emission::Aim.
+    // Starts without a weight are not traced, see emission::Aim.
     Emission emission = Emission(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), NO_TRIANGLE, 0.0);
     if (start.weight != 0.0) {
         Target target = EVERYTHING;
@@ -185,14 +185,15 @@ Emission emit_aimed(vec4 u, vec4 w, out uint light) {
         }
         AimedStart aimed = emit_from(start.light, start.place, start.direction, w.y, target);
         emission = aimed.emission;
-        bool kept = meets_first(size, start.target, aimed.on_target, aimed.passed, emission.direction, aimed.from_afar);
+        bool kept = hits_target_first(size, start.target, aimed.on_target, aimed.passed, emission.direction, aimed.distant);
         emission.flux *= kept ? start.weight / start.probability : 0.0;
     }
     return emission;
 }
 
 Emission emit(inout Random random, out uint light) {
-    // Place and direction are one point of four dimensions: what is left of the number that chose the light is the first.
+    // Place and direction are one four-dimensional point: the remainder of the number that chose the light is the first
+    // coordinate.
     vec4 u = next4(random);
     vec4 w = next4(random);
     Emission emission;

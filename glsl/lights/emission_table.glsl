@@ -1,4 +1,5 @@
-// Where aimed photon paths start: boxes of starts, each with a probability of its own. `emission::Table::texels` writes the buffer: its counts, the spheres that paths are aimed at, the cells.
+// The sampling table of aimed photon paths: boxes of starting coordinates, each with a probability. `emission::Table::texels`
+// writes the buffer: the counts, the target spheres, the cells.
 #ifndef LIGHTS_EMISSION_TABLE
 #define LIGHTS_EMISSION_TABLE
 
@@ -9,7 +10,7 @@ uniform usamplerBuffer EmissionTable;
 struct EmissionTableSize {
     uint cells;
     uint targets;
-    uint view; // the target around most of what the camera sees; as many as there are targets: none
+    uint view; // index of the target around most of the view; the number of targets if there is none
 };
 
 EmissionTableSize emission_table_size() {
@@ -26,17 +27,17 @@ EmissionCell emission_cell(EmissionTableSize size, uint i) {
     return EMISSION_CELL_AFTER(EmissionTable, 1u + size.targets, i);
 }
 
-// What a path starts with: five coordinates in [0, 1), of which the last has chosen the light.
+// The start of a path: five coordinates in [0, 1); the last one has chosen the light.
 struct Start {
     uint light;
     float probability; // of the light within its source
     vec2 place;
     vec2 direction;
-    uint target;  // that the path has to meet first of all; as many as there are: none
+    uint target;  // that the path has to hit first; the number of targets if there is none
     float weight; // 1 / density of the coordinates
 };
 
-// In steps of 2⁻²⁴, as random numbers are: tables are looked up with these.
+// In steps of 2⁻²⁴, like random numbers, because tables are looked up with these.
 vec4 in_box(vec4 low, vec4 size, vec4 u) {
     return min(floor((low + size * u) * 16777216.0), 16777215.0) * (1.0 / 16777216.0);
 }
@@ -52,24 +53,24 @@ Start choose_start(EmissionTableSize size, vec4 u, vec4 w) {
     return Start(within.light, within.probability, coordinates.xy, coordinates.zw, cell.target, cell.weight);
 }
 
-// Whether a ray meets a sphere. One that comes from afar has no beginning.
-bool meets_sphere(vec4 sphere, vec3 origin, vec3 direction, bool from_afar) {
+// Whether a ray hits a sphere. Distant light is a line without origin.
+bool hits_sphere(vec4 sphere, vec3 origin, vec3 direction, bool distant) {
     vec3 to_centre = sphere.xyz - origin;
     float along = dot(to_centre, direction);
-    vec3 off = to_centre - (from_afar ? along : max(along, 0.0)) * direction;
+    vec3 off = to_centre - (distant ? along : max(along, 0.0)) * direction;
     return dot(off, off) <= sphere.w * sphere.w;
 }
 
-// Whether it meets the target, unless that is known, and none of those before it.
-bool meets_first(EmissionTableSize size, uint target, bool known, vec3 origin, vec3 direction, bool from_afar) {
-    bool meets = known || target >= size.targets;
-    if (!meets) {
-        meets = meets_sphere(target_sphere(target), origin, direction, from_afar);
+// Whether a ray hits the target, unless that is known, and none of the targets before it.
+bool hits_target_first(EmissionTableSize size, uint target, bool known, vec3 origin, vec3 direction, bool distant) {
+    bool hits = known || target >= size.targets;
+    if (!hits) {
+        hits = hits_sphere(target_sphere(target), origin, direction, distant);
     }
-    for (uint i = 0u; i < min(target, size.targets) && meets; i++) {
-        meets = !meets_sphere(target_sphere(i), origin, direction, from_afar);
+    for (uint i = 0u; i < min(target, size.targets) && hits; i++) {
+        hits = !hits_sphere(target_sphere(i), origin, direction, distant);
     }
-    return meets;
+    return hits;
 }
 
 #endif

@@ -1,8 +1,8 @@
-// What shines from afar.
+// Environment lighting.
 //
-// The picture is equirectangular: its upper edge is +Y, its centre +Z, and -X lies to the right of it. The buffer has its
-// size and how far it is rotated about +Y, in turns, then each row's cosines at the upper and the lower edge, then the pixels; w: the probability of a row, or of a
-// pixel within its row, and those before it, in multiples of 2⁻²⁴ as random numbers are.
+// The picture is equirectangular: its upper edge is +Y, its centre +Z, and -X lies to the right of it. The buffer has the
+// picture's size and rotation about +Y, in turns; then each row's cosines at the upper and the lower edge; then the pixels. w:
+// the cumulative probability up to and including a row, or a pixel within its row, in multiples of 2⁻²⁴ like random numbers.
 #ifndef LIGHTS_ENVIRONMENT
 #define LIGHTS_ENVIRONMENT
 
@@ -13,7 +13,7 @@ uniform usamplerBuffer Environment;
 
 struct EnvironmentSample {
     vec3 radiance;
-    float density; // by which sample_environment chooses the direction, per solid angle
+    float density; // of sample_environment, per solid angle
 };
 
 uvec2 environment_size() {
@@ -28,7 +28,7 @@ vec3 environment_pixel(uvec2 size, uint x, uint y) {
     return TEXEL(Environment, 1u + size.y + y * size.x + x).rgb;
 }
 
-// One of `count` entries from `first` on, how far u lies into its part of [0, 1), and its probability.
+// One of `count` entries from `first` on, the position of u within its part of [0, 1), and its probability.
 struct Entry {
     uint index;
     float within;
@@ -51,7 +51,7 @@ Entry choose_entry(uint first, uint count, float u) {
             before = cumulative;
         }
     }
-    // In the middle of what the number's last bit stands for.
+    // In the middle of the interval of the number's last bit.
     return Entry(low, (u - before + 0.5 / 16777216.0) / (end - before), end - before);
 }
 
@@ -65,7 +65,7 @@ float solid_angle_of_pixel(uvec2 size, vec2 edges) {
     return 2.0 * PI / float(size.x) * (edges.x - edges.y);
 }
 
-// At a place in the picture, in pixels: between the four nearest centres.
+// At a position in the picture, in pixels: bilinear between the four nearest centres.
 vec3 environment_radiance(uvec2 size, vec2 place) {
     vec2 corner = floor(place - 0.5);
     vec2 part = place - 0.5 - corner;
@@ -77,7 +77,7 @@ vec3 environment_radiance(uvec2 size, vec2 place) {
                mix(environment_pixel(size, left, lower), environment_pixel(size, right, lower), part.x), part.y);
 }
 
-// atan has no value at the poles, where there is any.
+// atan is undefined at the poles, where every angle is right.
 float angle_of(float y, float x) {
     return x == 0.0 && y == 0.0 ? 0.0 : atan(y, x);
 }
@@ -87,8 +87,8 @@ float rows_below_pole(uvec2 size, float across, float up) {
     return min(angle_of(across, up) * (float(size.y) / PI), float(size.y));
 }
 
-// A direction, nearly in proportion to the radiance from there; uniform within a pixel. The pixel is the one that was
-// chosen: looked up again from the direction it may be the next one, by rounding, and that one's density much smaller.
+// A direction, nearly in proportion to its radiance; uniform within a pixel. The density is that of the chosen pixel: by
+// rounding, a look-up by direction may find its neighbour, whose density may be much smaller.
 EnvironmentSample sample_environment(vec2 u, out vec3 direction) {
     uvec2 size = environment_size();
     Entry row = choose_entry(1u, size.y, u.y);
@@ -103,7 +103,7 @@ EnvironmentSample sample_environment(vec2 u, out vec3 direction) {
                row.probability * column.probability / solid_angle_of_pixel(size, edges));
 }
 
-// What comes from a direction, which is a unit vector, and its density.
+// Radiance from a direction, a unit vector, and the density of sample_environment.
 EnvironmentSample environment_at(vec3 direction) {
     uvec2 size = environment_size();
     float turn = fract(0.5 + angle_of(-direction.x, direction.z) / (2.0 * PI) + environment_rotation());
@@ -115,8 +115,8 @@ EnvironmentSample environment_at(vec3 direction) {
     return EnvironmentSample(environment_radiance(size, place), probability / solid_angle_of_pixel(size, edges));
 }
 
-// What a ray sees that meets no surface.
-vec3 radiance_from_afar(vec3 direction) {
+// Radiance along a ray that hits no surface.
+vec3 environment_radiance_along(vec3 direction) {
     vec3 radiance = vec3(0.0);
     if (ENVIRONMENT) {
         radiance = environment_at(direction).radiance;

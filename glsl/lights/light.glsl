@@ -1,4 +1,4 @@
-// Lights, and what one of them sends to a point. Include after settings.glsl.
+// Lights, and the light of one of them at a point. Include after settings.glsl.
 #ifndef LIGHTS_LIGHT
 #define LIGHTS_LIGHT
 
@@ -7,7 +7,7 @@
 #include "trace/media.glsl"
 
 layout(constant_id = 14) const bool PUNCTUAL_LIGHTS = false;
-layout(constant_id = 30) const bool SOFT_LIGHTS = false; // some of them have an extent
+layout(constant_id = 30) const bool SOFT_LIGHTS = false; // some punctual lights have an extent
 layout(constant_id = 15) const bool ENVIRONMENT = false;
 layout(constant_id = 31) const bool PARTED_LIGHTS = false; // triangles whose parts are lights
 
@@ -18,7 +18,7 @@ Light light_at(uint i) {
     return LIGHT(Lights, i);
 }
 
-// That a light is in.
+// The media that a light is in.
 Media media_of_light(uint light) {
     Media media = IN_VACUUM;
     if (IMMERSED) {
@@ -31,7 +31,7 @@ Media media_of_light(uint light) {
 vec2 point_of_light(Light light, vec2 u) {
     vec2 uv = triangle_point(u);
     if (PARTED_LIGHTS) {
-        // Which part of the triangle it is: column, row, and how many columns there are. See scene::part.
+        // The part of the triangle: column, row, number of columns. See packing::part.
         vec3 part = light.position;
         vec2 at = (part.xy + uv) / part.z;
         uv = part.x + part.y >= part.z ? 1.0 - at : at;
@@ -43,7 +43,7 @@ bool is_light(Hit hit) {
     return shading_triangle(hit.triangle).light != NO_LIGHT;
 }
 
-// The light that a place of a triangle belongs to; NO_LIGHT where it doesn't shine.
+// The light that a point of a triangle belongs to; NO_LIGHT if it does not emit.
 uint light_at_place(Hit hit) {
     uint light = shading_triangle(hit.triangle).light;
     if (PARTED_LIGHTS && light != NO_LIGHT) {
@@ -108,7 +108,7 @@ Choice choose_light(float u, vec2 digits) {
     return alias_choice(place, entry.accept, entry.alias);
 }
 
-// Radiance at this cosine to the normal: a coat lies on lamps too.
+// Radiance at this cosine to the normal. Lamps may have a clear coat.
 vec3 emitted_radiance(Material material, float cosine) {
     float passed = 1.0;
     if (CLEARCOAT) {
@@ -117,14 +117,14 @@ vec3 emitted_radiance(Material material, float cosine) {
     return passed * material.emission;
 }
 
-// How much of its intensity a spot has at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as
+// The share of a spot's intensity at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as
 // KHR_lights_punctual recommends.
 float spot_falloff(Light light, float versine) {
     float ramp = clamp((light.outer - versine) / (light.outer - light.inner), 0.0, 1.0);
     return ramp * ramp;
 }
 
-// What a light with a range has left at a distance: KHR_lights_punctual's window over the inverse square.
+// The attenuation of a light with a range at a distance: KHR_lights_punctual's window over the inverse square.
 float range_window(float inverse_range, float distance) {
     float left = 1.0;
     if (PUNCTUAL_LIGHTS) {
@@ -135,9 +135,9 @@ float range_window(float inverse_range, float distance) {
     return left;
 }
 
-// What reaches a point from a punctual light, or a place of it that u chooses, if nothing is between.
+// The light of a punctual light at a point without occlusion; if the light has an extent, from the point of it that u chooses.
 struct Arriving {
-    vec3 ray;        // to the light, or towards where it comes from
+    vec3 ray;        // towards the light
     float end;       // of the ray, in its lengths
     vec3 irradiance; // across the ray
 };
@@ -147,9 +147,9 @@ Arriving arriving_from(Light light, vec3 point, vec2 u) {
     bool is_soft = SOFT_LIGHTS && light.extent > 0.0;
     vec3 ray = distant ? -light.direction : light.position - point;
     float distance2 = max(dot(ray, ray), 1e-37);
-    float area_over_angle = distance2; // of the light as it is seen
+    float area_over_angle = distance2; // area of the light over the solid angle that it subtends
     if (is_soft) {
-        // A disc that looks here is seen as a sphere is, and from within its radius in half of all directions.
+        // A disc that faces the receiver subtends the same solid angle as a sphere; within its radius, a hemisphere.
         float radius2 = light.extent * light.extent;
         float sin2 = radius2 / distance2;
         float versine = sin2 < 1.0 ? sin2 / (1.0 + sqrt(1.0 - sin2)) : 1.0;

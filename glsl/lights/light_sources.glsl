@@ -1,5 +1,5 @@
-// Which source of light a point asks: each of a few, or one by what each can bring to it at the most. Conty Estévez and Kulla, «Importance Sampling of
-// Many Lights with Adaptive Tree Splitting», HPG 2018.
+// Choosing a source of light for a point: each of a few sources, or one of many by a bound of its irradiance. Conty Estévez and
+// Kulla, «Importance Sampling of Many Lights with Adaptive Tree Splitting», HPG 2018.
 #ifndef LIGHTS_LIGHT_SOURCES
 #define LIGHTS_LIGHT_SOURCES
 
@@ -20,8 +20,8 @@ float cos_beyond(float cos_a, float cos_b) {
     return cos_a >= cos_b ? 1.0 : cos_a * cos_b + sines;
 }
 
-// Irradiance at the most, up to a factor.
-float most_from(LightSource source, vec3 position, vec3 normal) {
+// Upper bound of the irradiance, up to a constant factor.
+float irradiance_bound(LightSource source, vec3 position, vec3 normal) {
     vec3 to_centre = source.centre - position;
     float distance2 = dot(to_centre, to_centre);
     float radius2 = source.radius * source.radius;
@@ -32,7 +32,7 @@ float most_from(LightSource source, vec3 position, vec3 normal) {
         most = source.strength * max(0.0, cos_beyond(-dot(normal, source.axis), source.cos_cone));
     } else if (distance2 > radius2) {
         float inverse_distance = inversesqrt(max(distance2, 1e-37));
-        // The angle that its sphere is seen at.
+        // The angle that its bounding sphere subtends.
         float cos_width = sqrt(max(0.0, 1.0 - radius2 / distance2));
         float cos_surface = cos_beyond(dot(normal, to_centre) * inverse_distance, cos_width);
         float cos_light =
@@ -49,34 +49,34 @@ bool has_light(LightSource source, uint light) {
     return light - source.first_light < source.light_count;
 }
 
-// What all sources can bring.
-struct Brought {
+// The bounds of all sources.
+struct SourceBounds {
     float all;
-    float probability; // without knowing the point, of all that can bring anything
-    // By the one that has a light.
+    float probability; // independent of the point, of all sources with a bound above 0
+    // Of the source of a given light.
     float by_one;
     float probability_of_one;
 };
 
-Brought brought_to(vec3 position, vec3 normal, uint light) {
-    Brought brought = Brought(0.0, 0.0, 0.0, 0.0);
+SourceBounds source_bounds(vec3 position, vec3 normal, uint light) {
+    SourceBounds bounds = SourceBounds(0.0, 0.0, 0.0, 0.0);
     for (uint i = 0u; i < settings.light_source_count; i++) {
         loop_count += 1u;
         LightSource source = light_source_at(i);
-        float most = most_from(source, position, normal);
-        brought.all += most;
-        brought.probability += most > 0.0 ? source.probability : 0.0;
+        float most = irradiance_bound(source, position, normal);
+        bounds.all += most;
+        bounds.probability += most > 0.0 ? source.probability : 0.0;
         bool is_one = has_light(source, light);
-        brought.by_one = is_one ? most : brought.by_one;
-        brought.probability_of_one = is_one ? source.probability : brought.probability_of_one;
+        bounds.by_one = is_one ? most : bounds.by_one;
+        bounds.probability_of_one = is_one ? source.probability : bounds.probability_of_one;
     }
-    return brought;
+    return bounds;
 }
 
-// Where none can bring anything, nothing is lost by any choice.
-float probability_of_source(Brought brought, float most, float without_point) {
-    float with_point = most > 0.0 ? mix(most / brought.all, without_point / brought.probability, WITHOUT_POINT) : 0.0;
-    return brought.all <= 0.0 ? without_point : with_point;
+// If all bounds are 0, any choice is right.
+float probability_of_source(SourceBounds bounds, float most, float without_point) {
+    float with_point = most > 0.0 ? mix(most / bounds.all, without_point / bounds.probability, WITHOUT_POINT) : 0.0;
+    return bounds.all <= 0.0 ? without_point : with_point;
 }
 
 struct LightChoice {
@@ -86,16 +86,16 @@ struct LightChoice {
 
 // u chooses the source and u_light, a multiple of 2⁻²⁴, the light.
 LightChoice choose_light_for(vec3 position, vec3 normal, float u, float u_light) {
-    Brought brought = brought_to(position, normal, 0u);
+    SourceBounds bounds = source_bounds(position, normal, 0u);
     LightSource chosen = light_source_at(0u);
     float probability = 0.0;
     float sum = 0.0;
     for (uint i = 0u; i < settings.light_source_count && sum <= u; i++) {
         loop_count += 1u;
         LightSource source = light_source_at(i);
-        float of_source = probability_of_source(brought, most_from(source, position, normal), source.probability);
+        float of_source = probability_of_source(bounds, irradiance_bound(source, position, normal), source.probability);
         sum += of_source;
-        // Rounding may leave the last number beyond all: the last source that can be chosen has it.
+        // By rounding, u may lie beyond the sum: then the last source with a probability is chosen.
         bool counts = of_source > 0.0;
         probability = counts ? of_source : probability;
         if (counts) {
@@ -108,8 +108,8 @@ LightChoice choose_light_for(vec3 position, vec3 normal, float u, float u_light)
 
 // The probability of a light in `choose_light_for`.
 float probability_for(vec3 position, vec3 normal, uint light) {
-    Brought brought = brought_to(position, normal, light);
-    float of_source = probability_of_source(brought, brought.by_one, brought.probability_of_one);
+    SourceBounds bounds = source_bounds(position, normal, light);
+    float of_source = probability_of_source(bounds, bounds.by_one, bounds.probability_of_one);
     return of_source * probability_within(light);
 }
 

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Camera rays: follows each pixel's path over mirrors and glass to its visible points.
+// Camera paths: follows each pixel's path over mirrors and glass to its visible points.
 
 layout(local_size_x = 64) in;
 
@@ -15,15 +15,15 @@ layout(local_size_x = 64) in;
 #include "gather/visible_point.glsl"
 #include "common/status.glsl"
 
-// Visible points a pixel: above 1, glass splits the path for as long as a slot is free (the paper's estimator, whose
-// visible points are found once and have to hold both branches).
+// Visible points per pixel. Above 1, glass splits the path as long as a slot is free (the paper's estimator, whose visible points
+// are found once and have to cover both branches).
 layout(constant_id = 1) const uint SLOTS = 1u;
 layout(constant_id = 2) const bool JITTER = true;
 layout(constant_id = 19) const bool LENS = false;
 
 layout(push_constant) uniform Push {
     uint iteration;
-    uint path;  // of the pixel, of so many in this iteration
+    uint path;  // index of the camera path among those of the pixel in this iteration
     uint paths;
 } push;
 
@@ -36,30 +36,30 @@ struct Branch {
     vec3 direction;
     vec3 throughput;
     vec3 emitted;
-    float way; // from the camera so far
+    float way; // distance from the camera so far
     uint depth;
     PlacedTriangle ignored;
-    Media media;          // that it is in
-    float wavelength;     // nm; 0: of all
-    bool reflection_seen; // what a boundary that didn't split the path reflects of the lights' own radiance
-    bool lamps_seen;      // what lights with an extent send along the ray
+    Media media;          // of the ray
+    float wavelength;     // nm; 0: all wavelengths
+    bool reflection_seen; // emitters in the reflection of a boundary that did not split the path are added
+    bool lamps_seen;      // lights with an extent along the ray are added
 };
 
-// Lengths of a ray's direction up to what it met.
+// Distance to the hit, in lengths of the ray's direction.
 float way_of(Hit hit) {
     return hit.triangle == MISS ? 1e30 : hit.t;
 }
 
-// What passes a boundary waits while the path looks at what the boundary reflects, before it chooses which of both to follow: a
-// lamp's faint reflection in glass, seen by a rare choice alone, would be a bright speck.
-void let_wait(vec3 origin, vec3 direction, vec3 throughput, Media media) {
+// The transmitted ray of a boundary is stored while the reflected ray is traced for emitters, before one of both is followed: the
+// faint reflection of a lamp in glass, sampled by a rare choice only, would be a bright speck.
+void store_transmitted(vec3 origin, vec3 direction, vec3 throughput, Media media) {
     keep(FIRST_KEPT_BY_KERNEL, origin);
     keep(FIRST_KEPT_BY_KERNEL + 3u, direction);
     keep(FIRST_KEPT_BY_KERNEL + 6u, throughput);
     keep_media(FIRST_KEPT_BY_KERNEL + 9u, media);
 }
 
-void take_what_waits(inout Branch branch) {
+void load_transmitted(inout Branch branch) {
     branch.origin = kept(FIRST_KEPT_BY_KERNEL);
     branch.direction = kept(FIRST_KEPT_BY_KERNEL + 3u);
     branch.throughput = kept(FIRST_KEPT_BY_KERNEL + 6u);
@@ -92,7 +92,7 @@ void main() {
     branch.direction = settings.camera_forward.xyz + (parallel ? vec3(0.0) : place);
     float lens_radius = settings.camera_position.w;
     if (LENS && lens_radius > 0.0) {
-        // All rays of a place in the picture meet where it is in focus.
+        // All rays of a point of the picture meet in the plane of focus.
         vec2 on_lens = lens_radius * disc_point(next4(random).xy);
         vec3 off_axis = on_lens.x * normalize(settings.camera_right.xyz) + on_lens.y * normalize(settings.camera_up.xyz);
         branch.origin += off_axis;
@@ -109,7 +109,7 @@ void main() {
     branch.reflection_seen = false;
     branch.lamps_seen = false;
 
-    // Reflectance of a boundary that something which passes it waits for; negative where the reflection won't be followed.
+    // Reflectance of the boundary whose transmitted ray is stored; negative if the reflected ray will not be followed.
     float waits = 0.0;
     LightRay light_ray = NO_LIGHT_RAY;
     bool alive = inside;
@@ -117,12 +117,12 @@ void main() {
     bool cut = false;
     bool met_surface = false;
     bool found = false; // a visible point
-    Progress progress = AT_ORIGIN; // past backs that no camera sees
+    Progress progress = AT_ORIGIN; // past culled back faces
     while (alive) {
         loop_count += 1u;
         uint slot = pixel_slot * SLOTS + used;
-        // A path's rays are all traced here, since the traversal is compiled as often as it is called.
-        bool asks = asks_light(light_ray);
+        // All rays of a path are traced here: each call would compile the traversal again.
+        bool asks = contributes(light_ray);
         vec3 origin = asks ? light_ray.origin : branch.origin;
         vec3 direction = asks ? light_ray.direction : branch.direction;
         PlacedTriangle ignored = PlacedTriangle(asks ? MISS : branch.ignored.triangle, branch.ignored.instance);
@@ -137,9 +137,9 @@ void main() {
             branch.emitted += from_light;
         } else {
             bool culls = branch.depth == 0u;
-            bool dark = missed;       // nothing is there that scatters light
-            bool passes_back = false; // of a surface that no camera sees from there
-            vec3 passed = vec3(1.0); // of what comes along the ray
+            bool dark = missed;       // nothing at the hit scatters light
+            bool passes_back = false; // a culled back face
+            vec3 passed = vec3(1.0); // transmittance along the ray
             if (!branch.lamps_seen) {
                 vec3 from = branch.origin + progress.t * branch.direction;
                 branch.emitted += branch.throughput * soft_lights_along(from, branch.direction, way_of(hit) - progress.t,
@@ -147,7 +147,7 @@ void main() {
             }
             SurfaceInteraction met = no_interaction();
             if (missed) {
-                branch.emitted += branch.throughput * radiance_from_afar(branch.direction);
+                branch.emitted += branch.throughput * environment_radiance_along(branch.direction);
             } else {
                 met = interact(hit, branch.direction, branch.media, culls, random);
                 passes_back = culls && is_hidden_back(met.surface, met.material, branch.direction);
@@ -169,8 +169,8 @@ void main() {
                 branch.throughput *= 1.0 / reflectance;
                 goes_on = !passes;
                 if (passes) {
-                    take_what_waits(branch);
-                    // In the dark that was all there is to the reflection.
+                    load_transmitted(branch);
+                    // The reflection is complete: nothing at its hit scatters light.
                     branch.throughput *= dark ? 1.0 - reflectance : 1.0;
                 }
             }
@@ -228,7 +228,7 @@ void main() {
                         }
                         if (peeks) {
                             waits = u.x < p ? p : -p;
-                            let_wait(origin_towards(met.surface, ways.transmitted), ways.transmitted,
+                            store_transmitted(origin_towards(met.surface, ways.transmitted), ways.transmitted,
                                      branch.throughput * ways.transmitted_weight, met.beyond);
                             branch.reflection_seen = true;
                             branch.throughput *= p;
@@ -244,7 +244,8 @@ void main() {
                         stops = !reflects && !ways.transmits;
                         ended = stops || (largest(branch.throughput) <= 0.0 && waits == 0.0);
                     }
-                    // A visible point has the surface's base, and its reflection unless that is so narrow that the path follows it.
+                    // A visible point has the base of the surface, and its reflection unless that is so narrow that the path
+                    // follows it.
                     Bsdf bsdf = bsdf_of(met.material);
                     if (follows) {
                         bsdf = base_of(bsdf);
@@ -265,7 +266,7 @@ void main() {
                 branch.origin = origin_towards(met.surface, branch.direction);
             }
         }
-        if (ended && !asks_light(light_ray)) {
+        if (ended && !contributes(light_ray)) {
             if (found) {
                 visible_points[slot].emitted_normal.rgb = branch.emitted;
             } else {

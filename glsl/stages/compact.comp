@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Moves the lanes' photons together, in the order of lanes.
+// Joins the photon regions of all lanes, in the order of lanes.
 
 layout(local_size_x = 64) in;
 

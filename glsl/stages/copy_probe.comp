@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Copies 16 bytes an invocation: what the device's memory moves for a kernel.
+// Copies 16 bytes per invocation: measures the memory bandwidth of a kernel.
 
 layout(local_size_x = 64) in;
 

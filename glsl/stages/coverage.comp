@@ -1,9 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// How much of the disc of radius R around each visible point can have photons: past the edge of the object, or inside
-// an opaque one that stands on it, there are none. Random points of the disc say whether it can; their share corrects eq. 4,
-// which takes the whole disc. As long as a point has had no photon, a ray into its hemisphere says whether it lies in the open,
-// where none has to come.
+// The share of each visible point's disc that can receive photons: beyond the edge of the object, or inside an opaque object that
+// stands on it, there are none. Random points of the disc are tested; their share corrects equation 4, which assumes the whole
+// disc. While a point has received no photon, a ray into its hemisphere tests whether it lies in the open, where none is
+// expected.
 
 layout(local_size_x = 64) in;
 
@@ -28,7 +28,7 @@ uniform usamplerBuffer GatheredOf;
 layout(std430) readonly buffer Radii2 { float radii2[]; };
 layout(std430) buffer CoverageOf { Coverage coverage[]; };
 
-// The side of an object that a ray meets.
+// The side of an object that a ray hits.
 struct Side {
     uint object;
     bool front;
@@ -38,7 +38,7 @@ Side side_of(Surface surface, vec3 direction) {
     return Side(surface.object, dot(surface.geometric_normal, direction) < 0.0);
 }
 
-// Whether a ray leaves the object that was entered at that side.
+// Whether a ray leaves the object that it entered at that side.
 bool leaves(vec3 origin, vec3 direction, PlacedTriangle ignored, Side entered) {
     Hit hit = trace(origin, direction, 1e30, ignored, false);
     bool left = false;
@@ -68,7 +68,7 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
         if (surface.object == object) {
             return true; // the surface bends up
         }
-        // Light passes glass, and what isn't there everywhere.
+        // Light passes glass and partly transparent faces.
         if (!lets_light_pass(surface)) {
             inside = !inside;
             entered = side_of(surface, along);
@@ -76,11 +76,11 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
         progress = past(hit);
         ignored = triangle_of(hit);
     }
-    // An open sheet has been crossed, but encloses nothing.
+    // An open sheet was crossed; it encloses nothing.
     if (inside && leaves(origin + along, along, ignored, entered) && leaves(origin + along, n, ignored, entered)) {
         return false;
     }
-    // Then down: it may bend, but it must be there, under glass that lies on it and other faces in its place too.
+    // Then down: the surface may bend, but it must exist, also below glass that lies on it and coincident faces.
     vec3 down = -radius * n;
     Hit below = trace(origin + along, down, 1.0, NO_TRIANGLE, false);
     if (faces_coincide()) {
@@ -99,7 +99,7 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
     return there.object == object && opacity(below) > 0.0;
 }
 
-// Whether a ray meets something, past glass, that may scatter light or mirror it.
+// Whether a ray hits a surface behind glass that may scatter or reflect light.
 bool is_surrounded(VisiblePoint visible_point, vec2 u) {
     vec3 n = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
     vec3 origin = offset_origin(visible_point.position_object.xyz, n, reach_of(floatBitsToUint(visible_point.position_object.w)));
@@ -146,7 +146,7 @@ void main() {
     if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
         return;
     }
-    // Without photons there is nothing to correct.
+    // Without photons nothing needs a correction.
     bool has_photons = (accepted_by(receiver) | GATHERED(GatheredOf, receiver).count) != 0u;
     Coverage before = coverage[receiver];
     bool trusted = before.covered == before.asked && before.asked >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
@@ -166,7 +166,7 @@ void main() {
         Random sample_random = sample_of(random, i, push.points);
         covered += can_have_photons(visible_point, radius, next4(sample_random).xy) ? 1u : 0u;
     }
-    // Where a driver has too few loop iterations for it (a thousand triangles in one place), eq. 4 stays as it is.
+    // If the driver allows too few loop iterations (a thousand coincident triangles), equation 4 is not corrected.
     if (loops_cut) {
         covered = push.points;
     }

@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// What each visible point wants of photons, entered into the cells that its disc reaches: the squared relative error that a
-// photon of flux 1 would make of its pixel, times the visible points that such a photon reaches, up to a constant. A pixel
-// whose light is mostly direct wants few; where nothing is entered, no visible point can accept a photon.
+// The demand of each visible point for photons, added to the cells that its disc reaches: the squared relative error that a
+// photon of flux 1 would cause in its pixel, times the number of visible points that such a photon reaches, up to a constant. A
+// pixel with mostly direct light has a low demand; in an empty cell, no visible point can accept a photon.
 
 layout(local_size_x = 64) in;
 
@@ -73,7 +73,7 @@ void main() {
             for (int y = low.y; y <= high.y; y++) {
                 for (int x = low.x; x <= high.x; x++) {
                     uint entry = demand_entry(ivec3(x, y, z), of_shell, object);
-                    // Neighbours in the picture enter much the same.
+                    // Neighbours in the picture add nearly the same.
                     if (demand[entry] < wanted) {
                         atomicMax(demand[entry], wanted);
                     }

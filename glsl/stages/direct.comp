@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Adds what each visible point's path saw of the lights: by itself and, unless photons carry direct light too, by one
-// ray towards a light. Where glass alone stands between, photons have to bring that light: what it would be unbent is kept,
-// since it says what a picture without them doesn't have. That takes more rays: points that have photons ask now and then.
+// Adds the emission that each visible point's path has seen and, unless photons carry direct light too, direct light by one ray
+// towards a light. If only glass occludes the light, photons have to carry it: its contribution without refraction is stored, as
+// an estimate of what the picture lacks until they do. That takes more rays, so points that have photons do it in few iterations.
 
 layout(local_size_x = 64) in;
 
@@ -20,11 +20,11 @@ layout(local_size_x = 64) in;
 #include "common/status.glsl"
 
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
-layout(constant_id = 24) const bool ASKS_BEHIND_GLASS = true; // in this iteration, see config::RenderConfig
+layout(constant_id = 24) const bool ASKS_BEHIND_GLASS = true; // in this iteration, see RenderConfig::asks_behind_glass
 
 layout(push_constant) uniform Push {
     uint iteration;
-    uint path;  // of the pixel, of so many in this iteration
+    uint path;  // index of the camera path among those of the pixel in this iteration
     uint paths;
 } push;
 
@@ -35,7 +35,7 @@ layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 layout(std430) buffer CoverageOf { Coverage coverage[]; };
 layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteration's sequence
 
-// Whether a shadow ray that ends on glass goes on.
+// Whether a shadow ray that ends on glass continues.
 bool asks_behind_glass(uint slot) {
     bool asks = false;
     if (ASKS_BEHIND_GLASS) {
@@ -46,7 +46,7 @@ bool asks_behind_glass(uint slot) {
     return asks;
 }
 
-// Loaded where it is used: it would hold registers.
+// Loaded at its use: otherwise it would hold registers.
 VisibleBsdf bsdf_of_slot(uint slot, vec3 shading_normal) {
     VisibleBsdf bsdf = no_visible_bsdf();
     bsdf.normal = shading_normal;
@@ -56,15 +56,15 @@ VisibleBsdf bsdf_of_slot(uint slot, vec3 shading_normal) {
     return bsdf;
 }
 
-// One ray, by chance towards a point of a light or along a direction of the BSDF, with the density of both together
-// (one-sample multiple importance sampling: Veach, 1997, section 9.2.4). The lights' points alone have an unbounded
-// variance next to a light. What a light would bring is known before its ray is traced, so that little else is at hand then.
-// behind_glass: glass stands before the light, so that this is what it would bring unbent.
+// One ray, at random towards a point of a light or along a BSDF sample, with the density of both strategies together (one-sample
+// multiple importance sampling: Veach, 1997, section 9.2.4). Points of lights alone have unbounded variance next to a light. The
+// contribution is evaluated before the ray is traced, so that few values are live during the traversal. behind_glass: glass
+// occludes the light, and the result is its contribution without refraction.
 vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool asks, inout Random random,
                    out bool behind_glass) {
     behind_glass = false;
     vec4 u = next4(random);
-    // What chooses among many lights needs more digits.
+    // Choosing among many lights needs more digits.
     vec4 digits = settings.light_count > 1u ? next4(random) : vec4(0.0);
 
     vec3 position = visible_point.position_object.xyz;
@@ -76,7 +76,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     if (has_narrow_lobe(bsdf_of_slot(slot, shading_normal)) && settings.near_light_count > 0u) {
         bsdf_sampling = 0.5;
     }
-    bsdf_sampling = asks_delta_source(receiver) ? 0.0 : bsdf_sampling;
+    bsdf_sampling = is_delta_source(receiver) ? 0.0 : bsdf_sampling;
     bool by_bsdf = u.w < bsdf_sampling;
     LightSample sampled = ray_along(vec3(0.0));
     if (by_bsdf) {
@@ -108,7 +108,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
             vec3 tint;
             bool ends_at_light = by_bsdf && is_light(hit);
             goes_on = passes_unbent(hit, tint) && !ends_at_light;
-            // Of any hits the first one isn't known: the ray starts anew.
+            // Any-hit search does not find the first hit: the ray starts again.
             if (goes_on && !any) {
                 behind_glass = true;
                 brings *= tint;
@@ -131,7 +131,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     return is_cut || blocked ? vec3(0.0) : brings;
 }
 
-// Adds what it brings, or what that would be unbent.
+// Adds the contribution, or the one without refraction.
 void add_direct(VisiblePoint visible_point, uint slot, uint of_source, bool asks, inout Random random, inout vec3 radiance,
                 inout float unbent) {
     bool behind_glass;
@@ -159,7 +159,7 @@ void main() {
         asks = asks_behind_glass(slot);
         CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
         Random random = random_of_pixel(LIGHT_SAMPLE, slot, turn, settings.seed);
-        // Not one loop for both: around a single question it costs a quarter of the stage.
+        // Not one loop for both cases: around a single sample it costs a quarter of the stage.
         if (FEW_SOURCES) {
             for (uint source = 0u; source < settings.light_source_count; source++) {
                 add_direct(visible_point, slot, source, asks, random, radiance, unbent);

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Starts photon paths on the lights. Apart from `photons`, which would need its registers while it traces.
+// Starts photon paths on the lights. A stage of its own, because its registers would be live while `photons` traces.
 
 layout(local_size_x = 64) in;
 

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The automatic initial radius, point by point: where a gather of pilot photons found more than wanted, the radius
-// shrinks until it would hold as many as wanted. Keeps caustics sharp whose photons are far denser than the scene's.
+// The automatic initial radius, point by point: where a gather of pilot photons found more than wanted, the radius shrinks until
+// it would contain the wanted number. Keeps caustics sharp whose photon density is far above that of the scene.
 
 layout(local_size_x = 64) in;
 
@@ -11,8 +11,8 @@ layout(local_size_x = 64) in;
 #include "gather/statistics.glsl"
 
 layout(push_constant) uniform Push {
-    vec2 wanted; // photons of each map
-    float least; // footprints that R has at least
+    vec2 wanted; // number of photons of each map
+    float least; // lower bound of R, in footprints
 } push;
 
 layout(std430) readonly buffer Footprints { float footprints[]; };

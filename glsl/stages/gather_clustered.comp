@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Gathers for clusters of neighbouring visible points: an invocation has a run of them and tests each photon nearby
-// against all, so that a photon is loaded once for as many tests. A run falls into several clusters only where its points
-// lie far apart, as along silhouettes.
+// Gathers for clusters of neighbouring visible points: an invocation has a run of them and tests each nearby photon against all,
+// so that a photon is loaded once for all tests. A run is split into several clusters only if its points lie far apart, as along
+// silhouettes.
 
 layout(local_size_x = 64) in;
 
@@ -17,11 +17,11 @@ layout(local_size_x = 64) in;
 #include "gather/grid.glsl"
 #include "common/status.glsl"
 
-// Visible points: 4×2 pixels, see pixel_of. Processors load a photon once for all; on GPUs, whose caches do that, more than one
-// takes the registers that hide memory's latency.
+// Visible points of a run: 4×2 pixels, see pixel_of. CPUs load a photon once for all of them; GPUs have caches for that, and more
+// than one point takes registers that hide the latency of memory.
 layout(constant_id = 1) const uint RUN = 8u;
 
-// The part of the sorted photons that this launch looks at.
+// The part of the sorted photons that this launch tests.
 layout(push_constant) uniform Push {
     uint first;
     uint end;
@@ -38,7 +38,7 @@ uint cell_start(uint bucket) {
 }
 
 void main() {
-    // Neighbours in a run are neighbours in the picture; a pixel's several points lie in several runs.
+    // Neighbours in a run are neighbours in the picture; several points of a pixel lie in different runs.
     uint runs_of_map = slots() / RUN;
     uint map = invocation_index() / runs_of_map;
     uint run = invocation_index() % runs_of_map;
@@ -60,7 +60,7 @@ void main() {
         sums[k] = NOTHING;
         tested_for[k] = 0u;
     }
-    // What the loops have to do, and have done.
+    // Expected and completed loop iterations.
     uint points = 0u;
     uint points_done = 0u;
     uint rows = 0u;
@@ -85,7 +85,7 @@ void main() {
             any_pending = any_pending || pending[k];
         }
         while (any_pending) {
-            // The first point that is left, and those whose cells reach no more than one farther than it or they do alone.
+            // The first remaining point, and the points that extend the range of cells by at most one.
             any_pending = false;
             bool chosen = false;
             ivec3 low = ivec3(0);
@@ -113,7 +113,7 @@ void main() {
             rows += uint(extent.x * extent.y * extent.z);
             ivec3 row = first_row;
             bool more;
-            // Loops that test at their end: some drivers carry out a loop's body once more than its condition holds.
+            // Loops with the test at the end: some drivers run a loop's body once more than its condition holds.
             do {
                 uint bucket = bucket_of_row(row, of_shell);
                 int row_begin = row.x << ROW_BITS;
@@ -125,9 +125,9 @@ void main() {
                 do {
                     Photon photon = PHOTON(SortedPhotons, i);
                     vec3 position = photon.position_object.xyz;
-                    // Rows that share a bucket must not be counted twice.
+                    // Rows that share a bucket must be counted once.
                     bool here = i < end && row_of(cell_of(position, inverse)) == row && shell_of(position) == shell;
-                    // No receiver is on that object.
+                    // No receiver lies on that object.
                     photon.position_object.w = here ? photon.position_object.w : uintBitsToFloat(NO_OBJECT - 1u);
                     for (uint k = 0u; k < RUN; k++) {
                         gather(cluster[k], photon, sums[k]);
@@ -151,7 +151,7 @@ void main() {
         shells_done += 1u;
     }
     uint shells_wanted = all_shells.x <= all_shells.y ? all_shells.y + 1u - all_shells.x : 0u;
-    // Loops that didn't reach their end were cut by the driver: the gather is done again in smaller parts.
+    // Loops that did not reach their end were cut by the driver: the gather is repeated in smaller parts.
     if (tested != to_test || rows_done != rows || points_done != points ||
         shells_done != shells_wanted) {
         atomicOr(status.again, GATHERS_TOO_LONG);

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The bucket of each photon, to be sorted by, and how many photons each bucket has.
+// The bucket of each photon, as a key for sorting, and the number of photons in each bucket.
 
 layout(local_size_x = 64) in;
 

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Puts the photons into the order of their buckets; those of a bucket keep the order that they had.
+// Orders the photons by bucket; within a bucket they keep their order.
 
 layout(local_size_x = 64) in;
 

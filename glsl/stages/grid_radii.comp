@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// How large the discs are in each shell of each photon map: the cell sizes of the grids follow from that.
+// The size of discs in each shell of each photon map, from which the cell sizes of the grids follow.
 
 layout(local_size_x = 64) in;
 
@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 #include "gather/grid.glsl"
 
 layout(push_constant) uniform Push {
-    uint step; // of every how many slots the mean is taken
+    uint step; // the mean is over every step-th slot
 } push;
 
 uniform usamplerBuffer VisiblePoints;

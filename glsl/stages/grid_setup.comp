@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Chooses the cell size s of each grid. A visible point of radius R looks into (2R/s + 1)² rows of cells, and finds photons
-// of an area (2R + s)² there; where radii were fitted to the photons' density, that is as many as (2 + s/R)². What grows as
-// R/s and what grows as s/R weigh the same at a multiple of the geometric mean of the radii.
+// Chooses the cell size s of each grid. A visible point of radius R visits (2R/s + 1)² rows of cells, and finds photons of an
+// area (2R + s)² there; if radii are fitted to the photon density, their number is proportional to (2 + s/R)². The costs that
+// grow as R/s and as s/R balance at a multiple of the geometric mean of the radii.
 
 layout(local_size_x = 64) in;
 
@@ -20,7 +20,7 @@ void main() {
         return;
     }
     ShellRadii radii = radii_of_shells[i];
-    // Without a visible point any size will do; small cells keep the table even.
+    // Without visible points any size will do; small cells distribute photons evenly over the table.
     float balanced = radii.count > 0u ? CELLS_TO_RADIUS * mean_radius(radii) : SMALLEST_CELL;
     float bounded = sqrt(uintBitsToFloat(radii.largest)) / MOST_CELLS;
     float size = max(max(balanced, bounded), SMALLEST_CELL);

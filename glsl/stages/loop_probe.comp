@@ -1,6 +1,5 @@
 #version 460
-// Counts how many iterations the driver lets a loop make. The bits that are mixed in keep compilers from replacing the
-// loop by its result.
+// Counts the iterations that the driver allows a loop. The mixed bits keep compilers from replacing the loop by its result.
 
 layout(local_size_x = 1) in;
 

@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Photon tracing: each invocation (a lane) emits and follows its share of the batch's photon paths, one after the
-// other in one loop, so that no lane of a subgroup waits for another's longer path. A lane stores its photons in a
-// region of its own, which makes their order a pure function of the seed.
+// Photon tracing: each invocation (a lane) follows its share of the batch's photon paths, one after the other in one loop, so
+// that no invocation of a subgroup waits for another's longer path. A lane stores its photons in its own region, which makes
+// their order a pure function of the seed.
 
 layout(local_size_x = 64) in;
 
@@ -21,14 +21,14 @@ layout(local_size_x = 64) in;
 #include "common/status.glsl"
 
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
-layout(constant_id = 25) const bool DROP_UNWANTED = true; // photons that no visible point can accept aren't stored
+layout(constant_id = 25) const bool DROP_UNWANTED = true; // photons that no visible point can accept are not stored
 
 layout(std430) readonly buffer Grid { GridShape grid; };
 uniform usamplerBuffer Demand;
 uniform usamplerBuffer PathStarts;
 layout(std430) writeonly buffer LanePhotons { Photon lane_photons[]; };
 layout(std430) writeonly buffer LaneCounts { uint lane_counts[]; };
-layout(std430) writeonly buffer LaneOffsets { uint lane_offsets[]; }; // the same, to be summed up
+layout(std430) writeonly buffer LaneOffsets { uint lane_offsets[]; }; // the same, for a prefix sum
 layout(std430) writeonly buffer PathValues { uint path_values[]; }; // of an iteration's first batch
 
 struct Path {
@@ -37,10 +37,10 @@ struct Path {
     vec3 flux;
     uint depth;
     PlacedTriangle ignored;
-    Media media; // that it is in
-    float wavelength; // nm; 0: of all
+    Media media; // of the ray
+    float wavelength; // nm; 0: all wavelengths
     bool seen_directly; // no bounce since the light: direct light, which `direct` samples
-    bool caustic;       // mirrors and glass alone since the light
+    bool caustic;       // only mirrors and glass since the light
     float inverse_range; // of the light, until the first surface
 };
 
@@ -60,7 +60,7 @@ Path path_from(uint start) {
     return path;
 }
 
-// Russian roulette that keeps the photons' powers alike: survives with the ratio of its largest channels.
+// Russian roulette that keeps the flux of photons similar: the survival probability is the ratio of the largest channels.
 bool survives(inout vec3 flux, vec3 scattered, float u) {
     float arriving = largest(flux);
     float probability = arriving > 0.0 ? min(1.0, largest(scattered) / arriving) : 0.0;
@@ -68,7 +68,7 @@ bool survives(inout vec3 flux, vec3 scattered, float u) {
     return u < probability;
 }
 
-// What visible points want of a photon: see `demand`.
+// Demand for a photon, see stage `demand`.
 float demand_at(vec3 position, uint object, uint map) {
     uint of_shell = map * SHELLS + shell_of(position);
     ivec3 cell = cell_of(position, grid.inverse_cell_size[of_shell] * (1.0 / COARSENING));
@@ -76,8 +76,8 @@ float demand_at(vec3 position, uint object, uint map) {
     return TEXEL(Demand, entry >> 2u)[entry & 3u];
 }
 
-// What a path was worth, and the rays that it traced, for where later ones are aimed; see emission::PathValue. One that was
-// rejected at its start has neither.
+// Stores the value of a path and its number of rays, from which the emission table is learned; see emission::PathValue. Both are
+// 0 for a path that was rejected at its start.
 void note_value(uint path, float value, uint rays) {
     if (AIMED && push.first_path == 0u) {
         path_values[path] = (floatBitsToUint(value) << 1u & 0xffffff00u) | min(rays, 255u);
@@ -91,11 +91,11 @@ void main() {
     }
     uint stored = 0u;
     uint landed = 0u;
-    float value = 0.0; // of the path: squared errors that its photons make of the picture
+    float value = 0.0; // of the path: squared errors that its photons cause in the picture
     uint rays = 0u;    // of the path
     uint next = lane;
     bool alive = false;
-    // What is the same for all paths is known before the loop: it takes no registers of each lane.
+    // Values that are equal for all paths are set before the loop: they take no vector registers.
     Random random = random_of_path(lane);
     Path path = Path(vec3(0.0), vec3(0.0), vec3(0.0), 0u, NO_TRIANGLE, IN_VACUUM, 0.0, true, true, 0.0);
     uint truncated = 0u;
@@ -128,7 +128,7 @@ void main() {
             vec3 incoming = path.direction;
             SurfaceInteraction met = interact(hit, incoming, path.media, false, random);
             path.flux *= transmittance(met.through.first, hit.t);
-            // A range is how far the light itself reaches, not what it lights.
+            // The range of a light applies to its first segment only.
             path.flux *= range_window(path.inverse_range, hit.t);
             path.inverse_range = 0.0;
             path.ignored = met.surface.triangle;
@@ -136,7 +136,7 @@ void main() {
             if (met.hidden) {
                 path.flux *= met.tint;
                 path.media = met.beyond;
-                // No ray to a light passes it.
+                // Shadow rays do not pass this boundary.
                 path.seen_directly = false;
             } else if (alive) {
                 vec4 u = next4(random);
@@ -155,7 +155,7 @@ void main() {
                             float flux = (landing.r + landing.g + landing.b) * (1.0 / 3.0);
                             value = min(value + wanted * flux * flux, 1e37);
                             if (stored < settings.lane_capacity) {
-                                // What is there in part is seen in part as well as met in part.
+                                // A partly transparent surface is seen in part as well as hit in part.
                                 vec3 flux_there = path.flux * kept_factor(met, incoming) / met.opacity;
                                 lane_photons[stored * settings.photon_lanes + lane] =
                                     Photon(vec4(met.surface.position, uintBitsToFloat(met.surface.object | map << 31u)),
@@ -174,7 +174,7 @@ void main() {
                 path.flux *= way.color;
                 vec3 scattered = path.flux * way.weight;
                 alive = is_possible(way, met.frame) && finite(scattered) && survives(path.flux, scattered, u.z);
-                // Those that are aimed shall come there, with less flux each.
+                // Weighted after Russian roulette: many aimed photons survive, with less flux each.
                 path.flux *= guided;
                 alive = alive && guided > 0.0;
                 path.direction = way.direction;
@@ -206,7 +206,7 @@ void main() {
         atomicOr(status.again, PHOTONS_DID_NOT_FIT);
     }
     if (!finished) {
-        // The loop's own end was never reached: the driver or the limit cut it. Fewer paths a lane may help.
+        // The driver or the limit cut the loop. Fewer paths per lane may help.
         uint begun = alive ? 1u : 0u;
         uint left = next < push.path_count ? (push.path_count - 1u - next) / settings.photon_lanes + 1u : 0u;
         atomicAdd(status.cut_paths, begun + left);

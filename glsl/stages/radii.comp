@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// R² that each visible point gathers within in this iteration, for each photon map. The first visible point of a slot sets
-// its R. Those of later iterations may lie nearer, along silhouettes: there a disc that suits the surface behind would cover
-// many pixels, so that no disc is larger than a multiple of the pixel's footprint.
+// R² of each visible point's disc in this iteration, for each photon map. The first visible point of a slot sets its R. Those of
+// later iterations may be nearer, along silhouettes: a disc of the surface behind would cover many pixels there, so no disc is
+// larger than a multiple of the pixel's footprint.
 
 layout(local_size_x = 64) in;
 

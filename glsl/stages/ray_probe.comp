@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Traces given rays, for tests: what they meet is their hit.
+// Traces given rays and returns their hits, for tests.
 
 layout(local_size_x = 64) in;
 

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Statistics before the first iteration. `radii` gives each slot its R.
+// Clears the statistics before the first iteration. `radii` sets the R of each slot.
 
 layout(local_size_x = 64) in;
 

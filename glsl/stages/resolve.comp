@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The paper's image synthesis: eq. 4 for each visible point, and the mean of what was seen directly. And what tells how much light
-// behind glass no photon has brought yet.
+// The paper's image synthesis: equation 4 for each visible point, and the mean of directly seen light. Also estimates the light
+// behind glass that no photon has carried yet.
 
 layout(local_size_x = 64) in;
 
@@ -15,7 +15,7 @@ layout(local_size_x = 64) in;
 layout(push_constant) uniform Push {
     uint iterations;
     float emitted; // photon paths of all iterations
-    uint camera_paths; // of a pixel, of all iterations
+    uint camera_paths; // per pixel, of all iterations
 } push;
 
 uniform usamplerBuffer VisiblePoints;
@@ -25,7 +25,7 @@ layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
 layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left; w: see below
 layout(std430) writeonly buffer GlassFilm { BehindGlass glass_film[]; }; // likewise
 
-// 64 bits: a carry of the low words is one more high one.
+// 64-bit addition with carry.
 void add_accepted(uint low, uint high) {
     if ((low | high) != 0u) {
         uint before = atomicAdd(status.photons_accepted_low, low);
@@ -33,7 +33,7 @@ void add_accepted(uint low, uint high) {
     }
 }
 
-// How wide a pixel is at a visible point that is seen directly.
+// The width of a pixel at a visible point that is seen directly.
 float pixel_width(vec3 position) {
     return settings.pixel_spread * (settings.camera_up.w != 0.0 ? 1.0 : length(position - settings.camera_position.xyz));
 }
@@ -55,11 +55,11 @@ void main() {
     for (uint i = 0u; i < settings.slots_per_pixel; i++) {
         uint slot = pixel_slot * settings.slots_per_pixel + i;
         DirectSum sum = direct_sums[slot];
-        // The quotient of flux and emitted photons comes first: both grow without bound, it doesn't.
+        // Flux is divided by emitted photons first: both grow without bound, their quotient does not.
         radiance += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
         glass.unbent += unbent_of(sum);
         has_surface = has_surface || coverage[slot].surrounded > 0u;
-        // Slots of a pixel share its paths.
+        // The slots of a pixel share its camera paths.
         met = max(met, coverage[slot].met);
         VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
         bool lies_behind_glass =
@@ -77,7 +77,7 @@ void main() {
                 glass.arrived += through_glass ? mean_of(by_photons) : 0.0;
             }
             if (lies_behind_glass && through_glass) {
-                // Of several slots, what the one with the most photons has.
+                // Of several slots, the one with the most photons.
                 glass.photons = max(glass.photons, float(photons_of(mine.accepted_low, mine.accepted_high)));
                 float radius = sqrt(mine.radius2_high) / pixel_width(visible_point.position_object.xyz);
                 glass.radius = max(glass.radius, radius);
@@ -89,7 +89,8 @@ void main() {
         atomicAdd(status.non_finite, 1u);
         radiance = vec3(0.0);
     }
-    // Alpha, the share of the camera paths that met a surface; negative where no photon has come yet to one that isn't in the open.
+    // Alpha, the share of camera paths that met a surface; negative if a point that is not in the open has received no photon
+    // yet.
     float alpha = float(met) / float(push.camera_paths);
     alpha = has_surface && !has_photons ? -alpha : alpha;
     uint index = pixel.y * settings.resolution.x + pixel.x;

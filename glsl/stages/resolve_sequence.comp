@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The picture of one sequence alone: the mean of what its iterations have brought.
+// The picture of one sequence: the mean of its iterations.
 
 layout(local_size_x = 64) in;
 

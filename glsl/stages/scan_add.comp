@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Exclusive prefix sums, last of two stages: every workgroup adds to a block what lies before it, which it sums up from the
-// blocks' sums by itself. These are few: to read them often takes less time than one more launch.
+// Exclusive prefix sums, last of two stages: each workgroup sums up the blocks before its block and adds that sum to the block.
+// There are few block sums: reading them repeatedly takes less time than another launch.
 
 layout(local_size_x = 64) in;
 

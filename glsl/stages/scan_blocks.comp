@@ -1,7 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Exclusive prefix sums, first of two stages: every workgroup scans a block of numbers in place and notes
-// the block's sum.
+// Exclusive prefix sums, first of two stages: each workgroup scans a block of numbers in place and stores the block's sum.
 
 layout(local_size_x = 128) in;
 

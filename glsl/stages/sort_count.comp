@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Radix sort, first stage of a pass: how often each digit occurs in each tile.
+// Radix sort, first stage of a pass: counts each digit in each tile.
 
 layout(local_size_x = 128) in;
 
@@ -15,7 +15,7 @@ shared uint counts[MOST_DIGITS];
 void main() {
     uint me = gl_LocalInvocationID.x;
     uint first = workgroup_index() * SORT_TILE;
-    // Room for more keys than there are costs nothing.
+    // Capacity beyond the number of keys costs nothing.
     if (first >= sort_count) {
         return;
     }

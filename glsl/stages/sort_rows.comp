@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Radix sort, second stage of a pass: every workgroup replaces a digit's counts of the tiles by those of the tiles before, and
-// notes how often it occurs in all.
+// Radix sort, second stage of a pass: each workgroup replaces a digit's counts in the tiles by their exclusive prefix sums, and
+// stores the digit's total.
 
 layout(local_size_x = 64) in;
 

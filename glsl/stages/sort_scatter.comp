@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Radix sort, last stage of a pass: each key goes to its place among all keys. A workgroup sorts its tile by the digit first, in
-// shared memory and by four bits at a time, so that a digit's keys are neighbours when they are written.
+// Radix sort, last stage of a pass: moves each key to its place. A workgroup first sorts its tile by the digit, in shared memory
+// and by four bits at a time, so that keys of a digit are neighbours when they are written.
 
 layout(local_size_x = 128) in;
 
@@ -21,31 +21,31 @@ const uint QUADS = 4u;      // of the values of four bits
 const uint GROUP_SIZE = 8u; // threads: their items of a value fit a byte
 const uint GROUPS = gl_WorkGroupSize.x / GROUP_SIZE;
 
-// Digits above, and below them the keys' places in the tile.
+// High bits: digits; low bits: the keys' places in the tile.
 const uint DIGIT_SHIFT = 16u;
 const uint COUNT_SHIFT = 28u;
 shared uint items[SORT_TILE];
-// [quad][thread], a byte for each value: first how many items the thread has, then how many those before it in its group have. With
-// more than a byte each, shared memory would bound how many workgroups a GPU can hold. After the
-// sort it is [digit], see `find_places`.
+// [quad][thread], a byte for each value: first the number of items of the thread, then that of the threads before it in its
+// group. With more than a byte each, shared memory would limit the number of workgroups that fit a GPU. After the sort it is
+// [digit], see `find_places`.
 shared uint counts[QUADS * gl_WorkGroupSize.x];
-shared uint of_groups[QUADS * GROUPS];   // [quad][group], likewise: how many the group has
-shared uint starts[QUADS * 2u * GROUPS]; // [value][group], 16 bits each: where its first item goes
+shared uint of_groups[QUADS * GROUPS];   // [quad][group], likewise: number of items of the group
+shared uint starts[QUADS * 2u * GROUPS]; // [value][group], 16 bits each: place of the first item
 
 uint byte_of(uint word, uint i) {
     return word >> i * 8u & 0xffu;
 }
 
-// Sorts the tile by four bits. Each thread has a run of it, one item after the other, which keeps the order of equal ones.
+// Sorts the tile by four bits. Each thread has a run of consecutive items, which keeps the order of equal keys.
 void split(uint mine[PER_THREAD], uint shift) {
     uint me = gl_LocalInvocationID.x;
     uint group = me / GROUP_SIZE;
-    uvec4 count = uvec4(0u); // of the thread's own ones, a byte for each value: registers take less time than shared memory
+    uvec4 count = uvec4(0u); // of the thread, a byte for each value: registers are faster than shared memory
     for (uint i = 0u; i < PER_THREAD; i++) {
         uint value = bitfieldExtract(mine[i], int(shift), 4);
         uvec4 here = uvec4(equal(uvec4(value / 4u), uvec4(0u, 1u, 2u, 3u)));
         uvec4 counted = count * here;
-        // How many of its items have come before goes above the digit: in registers of its own it would take as many again.
+        // The number of previous items with this value is stored above the digit: separate registers would double their number.
         mine[i] |= byte_of(counted.x | counted.y | counted.z | counted.w, value % 4u) << COUNT_SHIFT;
         count += here << value % 4u * 8u;
     }
@@ -80,7 +80,7 @@ void split(uint mine[PER_THREAD], uint shift) {
     barrier();
 }
 
-// Where each digit's keys of this tile begin among all.
+// The place of each digit's first key of this tile among all keys.
 void find_places() {
     uint digit = 2u * gl_LocalInvocationID.x;
     bool has = digit < digits();
@@ -97,7 +97,7 @@ void find_places() {
 void main() {
     uint me = gl_LocalInvocationID.x;
     uint tile = workgroup_index() * SORT_TILE;
-    // Room for more keys than there are costs nothing.
+    // Capacity beyond the number of keys costs nothing.
     if (tile >= sort_count) {
         return;
     }
@@ -105,7 +105,7 @@ void main() {
     uint mine[PER_THREAD];
     for (uint i = 0u; i < PER_THREAD; i++) {
         uint place = me * PER_THREAD + i;
-        // What is no key goes behind the keys of the last digit.
+        // Padding goes behind the keys of the last digit.
         uint digit = place < keys ? digit_of(keys_in[tile + place]) : digits() - 1u;
         mine[i] = digit << DIGIT_SHIFT | place;
     }
@@ -123,7 +123,7 @@ void main() {
         mine[i] = items[place];
         uint digit = mine[i] >> DIGIT_SHIFT;
         if (place == 0u || items[place - 1u] >> DIGIT_SHIFT != digit) {
-            counts[digit] -= place; // less where they begin in the tile
+            counts[digit] -= place; // minus the first place in the tile
         }
     }
     barrier();

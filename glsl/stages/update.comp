@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Takes an iteration's photons into each visible point's statistics (equations 2 and 3), and what they add to the picture into
+// Adds an iteration's photons to each visible point's statistics (equations 2 and 3), and their contribution to the picture to
 // the sum of its sequence.
 
 layout(local_size_x = 64) in;
@@ -27,12 +27,12 @@ layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteratio
 vec4 update_map(uint receiver, vec3 weight) {
     Gathered arrived = gathered[receiver];
     if (arrived.count == 0u) {
-        return vec4(0.0); // nothing has come, and nothing changes
+        return vec4(0.0); // no photon: nothing changes
     }
     gathered[receiver] = Gathered(vec3(0.0), 0u, 0.0, 0u, 0u, 0u);
     Statistics mine = statistics[receiver];
     vec4 flux = vec4(weight * arrived.flux, mean_of(weight) * curvature(arrived, radii2[receiver]));
-    // τ is that of a disc of R. A smaller one has been gathered from where that has a bound, see `radii`.
+    // τ belongs to a disc of radius R. The gathered disc may be smaller, see stage `radii`.
     float radius2 = mine.radius2_high;
     flux *= radius2 / radii2[receiver];
     if (!finite(flux.rgb) || isnan(flux.w) || isinf(flux.w)) {

@@ -1,6 +1,6 @@
-// Faces in one place. Rounding decides which of them a ray meets first, and the step off the one takes it past the others: all
-// that are no further apart are met at once. What is opaque is met before glass that lies on it, what shines or looks to the ray
-// before what doesn't. Include after common/random.glsl.
+// Coincident faces. Rounding decides which of them a ray hits first, and the offset of the next ray's origin skips the others. So
+// all faces within that distance are hit at once. Opaque faces have priority over glass that lies on them, faces that emit or
+// face the ray over others. Include after common/random.glsl.
 #ifndef TRACE_COINCIDENT
 #define TRACE_COINCIDENT
 
@@ -10,22 +10,22 @@
 layout(constant_id = 8) const bool CONTACT = true;
 layout(constant_id = 23) const bool CULLING = false;
 
-// What lies in the place where a ray meets matter.
+// The faces at the point where a ray hits a surface.
 struct Interface {
-    Hit hit;       // of the face that it meets
-    vec3 reach;    // of the faces, see Surface
-    float opacity; // chance of meeting it, where something isn't there everywhere
+    Hit hit;       // of the face with the highest priority
+    vec3 reach;    // of all faces, see Surface
+    float opacity; // probability of hitting it, if faces are partly transparent by alpha
     bool is_flat;  // a solid dielectric without thickness
-    vec3 tint;     // of the other boundaries of dielectrics there
-    Media through; // that the ray came through
-    Media beyond;  // behind boundaries of dielectrics
+    vec3 tint;     // of the other dielectric boundaries
+    Media through; // in front of the boundaries
+    Media beyond;  // behind the boundaries
 };
 
 Interface interface_of(Hit hit, Media media) {
     return Interface(hit, vec3(0.0), 1.0, false, vec3(1.0), media, media);
 }
 
-// As the ray crosses a boundary of a medium.
+// Updates the media as the ray crosses a boundary.
 void cross_boundary(inout Interface place, uint medium, bool front) {
     if (front) {
         if (NESTED) {
@@ -38,34 +38,34 @@ void cross_boundary(inout Interface place, uint medium, bool front) {
     }
 }
 
-// Of faces in one place that are no dielectrics', the highest is met.
+// Priority of coincident faces that are not dielectric: the highest is hit.
 uint preference(Surface surface, Material material, vec3 incoming) {
     bool front = dot(incoming, surface.geometric_normal) < 0.0;
-    bool shines = largest(material.emission) > 0.0 && emits(material, front);
+    bool emitting = largest(material.emission) > 0.0 && emits(material, front);
     bool see_through = (surface.flags & SEE_THROUGH) != 0u;
-    uint kind = (shines ? 8u : 0u) | (front ? 4u : 0u) | (hides_back(material) ? 0u : 2u) | (see_through ? 1u : 0u);
+    uint kind = (emitting ? 8u : 0u) | (front ? 4u : 0u) | (hides_back(material) ? 0u : 2u) | (see_through ? 1u : 0u);
     return kind << 28u | min(surface.object + 1u, 0xfffffffu);
 }
 
-// Whether it is a back that no camera sees.
+// Whether it is a back face that is culled for the camera.
 bool is_hidden_back(Surface surface, Material material, vec3 incoming) {
     return CULLING && hides_back(material) && dot(incoming, surface.geometric_normal) > 0.0;
 }
 
-// Whether other faces may lie where a triangle is met.
+// Whether other faces may coincide with a hit.
 bool may_coincide(Surface surface, bool front) {
     bool touched = CONTACT && (surface.flags & TOUCHED) != 0u;
     bool coincides = COINCIDENCE && ((surface.flags & COINCIDENT) != 0u || (!front && (surface.flags & BACKED) != 0u));
     return touched || coincides;
 }
 
-// What is known of the place while its faces are looked for.
+// The state of the search for coincident faces.
 struct Search {
     Interface place;
-    uint preferred;      // of the opaque face that is met
-    uint missing;        // most preferred of those that aren't there
-    float share_missing; // its opacity
-    uint solid;          // the lowest of the other solids
+    uint preferred;      // priority of the opaque face
+    uint missing;        // highest priority of the faces that alpha removed
+    float missing_opacity; // its opacity
+    uint solid;          // lowest medium of the other solids
 };
 
 void keep_search(Search search) {
@@ -74,7 +74,7 @@ void keep_search(Search search) {
     keep(3u, place.tint);
     keep(6u, vec3(place.hit.u, place.hit.v, place.opacity));
     keep(9u, uvec4(place.hit.triangle, place.hit.instance, search.preferred, search.missing));
-    keep(13u, vec3(search.share_missing, uintBitsToFloat(search.solid), place.is_flat ? 1.0 : 0.0));
+    keep(13u, vec3(search.missing_opacity, uintBitsToFloat(search.solid), place.is_flat ? 1.0 : 0.0));
     keep_media(16u, place.through);
     keep_media(20u, place.beyond);
 }
@@ -88,15 +88,15 @@ Search kept_search() {
     return Search(place, bits.z, bits.w, more.x, floatBitsToUint(more.y));
 }
 
-// Takes another face of the place into account, which is there.
-void meet_face(inout Search search, inout bool opaque, Hit hit, Surface face, Material material, bool doubles, float share,
+// Adds another coincident face, which alpha has not removed.
+void add_face(inout Search search, inout bool opaque, Hit hit, Surface face, Material material, bool doubles, float face_opacity,
                vec3 incoming, Media media) {
     bool glass = is_dielectric(material);
     uint preference_of_face = preference(face, material, incoming);
     if (!glass && preference_of_face > search.preferred) {
         search.preferred = preference_of_face;
         search.place.hit = hit;
-        search.place.opacity = share;
+        search.place.opacity = face_opacity;
         opaque = true;
     } else if (is_solid(material) && !opaque) {
         search.place.is_flat = search.place.is_flat || doubles;
@@ -113,7 +113,7 @@ void meet_face(inout Search search, inout bool opaque, Hit hit, Surface face, Ma
     }
 }
 
-// media: those that the ray is in, as far as its path knows. With `culls` backs that no camera sees aren't there.
+// media: those that the ray is in, as tracked by its path. With `culls`, culled back faces are ignored.
 Interface coincident_interfaces(Hit hit, vec3 incoming, Media media, bool culls, Random random) {
     Search search = Search(interface_of(hit, media), 0u, 0u, 0.0, VACUUM);
     search.place.opacity = opacity(hit);
@@ -132,11 +132,11 @@ Interface coincident_interfaces(Hit hit, vec3 incoming, Media media, bool culls,
         keep(24u, first.position);
         keep(27u, first.geometric_normal);
         keep(30u, first.reach);
-        lane_memory[STACK_SIZE + 33u] = first.object;
+        private_memory[STACK_SIZE + 33u] = first.object;
         Progress progress = AT_ORIGIN;
         bool goes_on = true;
         while (goes_on) {
-            // What lies there may be larger and so less certain.
+            // The other face may be larger and so its plane less certain.
             vec3 of_first = kept(30u);
             float probe = ROUNDINGS * max(of_first.x + of_first.y + of_first.z, 1.0);
             vec3 across = probe * kept(27u);
@@ -149,19 +149,19 @@ Interface coincident_interfaces(Hit hit, vec3 incoming, Media media, bool culls,
                 vec3 n = kept(27u);
                 vec3 reach = max(other.reach, kept(30u));
                 bool apart = abs(dot(other.position - kept(24u), n)) > ROUNDINGS * dot(abs(n), reach);
-                bool same_object = other.object == lane_memory[STACK_SIZE + 33u];
+                bool same_object = other.object == private_memory[STACK_SIZE + 33u];
                 bool doubles = same_object && dot(other.geometric_normal, n) < -PARALLEL;
                 bool hidden = culls && is_hidden_back(other, other_material, incoming);
                 if (!apart && (!same_object || doubles) && !hidden) {
-                    float share = opacity(other_hit);
+                    float face_opacity = opacity(other_hit);
                     search = kept_search();
-                    if (of_face(random, triangle_of(other_hit)) < share) {
+                    if (opacity_number(random, triangle_of(other_hit)) < face_opacity) {
                         search.place.reach = max(search.place.reach, reach);
-                        meet_face(search, opaque, other_hit, other, other_material, doubles, share, incoming, media);
+                        add_face(search, opaque, other_hit, other, other_material, doubles, face_opacity, incoming, media);
                     } else {
                         uint preference_of_other = preference(other, other_material, incoming);
                         bool most = preference_of_other > search.missing;
-                        search.share_missing = most ? share : search.share_missing;
+                        search.missing_opacity = most ? face_opacity : search.missing_opacity;
                         search.missing = most ? preference_of_other : search.missing;
                     }
                     keep_search(search);
@@ -169,7 +169,7 @@ Interface coincident_interfaces(Hit hit, vec3 incoming, Media media, bool culls,
             }
         }
         search = kept_search();
-        search.place.opacity *= search.missing > search.preferred ? 1.0 - search.share_missing : 1.0;
+        search.place.opacity *= search.missing > search.preferred ? 1.0 - search.missing_opacity : 1.0;
         if (opaque) {
             search.place.is_flat = false;
             search.place.tint = vec3(1.0);
@@ -178,7 +178,7 @@ Interface coincident_interfaces(Hit hit, vec3 incoming, Media media, bool culls,
             search.place.through = media;
             search.place.beyond = media;
         } else if (search.solid != VACUUM) {
-            // The boundary is that of what is there on either side.
+            // The boundary belongs to the medium that counts on either side.
             Surface surface = surface_at(hit);
             uint own = bounded_medium(media, surface, dot(incoming, surface.geometric_normal) < 0.0);
             if (solid && (own == search.place.through.first || own == search.place.beyond.first)) {

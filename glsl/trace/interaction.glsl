@@ -1,21 +1,22 @@
-// Where rays meet matter: the room's front. Closest and any hits are those of `trace_visible`. Include after common/random.glsl.
+// Surface interactions: the interface of glsl/trace. Closest and any hits are those of `trace_visible`. Include after
+// common/random.glsl.
 #ifndef TRACE_INTERACTION
 #define TRACE_INTERACTION
 
 #include "trace/coincident.glsl"
 
-// Both normals, turned to the side that a ray comes from.
+// Both normals, on the side of the incoming ray.
 struct ShadingFrame {
     vec3 geometric_normal;
     vec3 shading_normal;
-    bool front; // the ray meets the triangle's front
+    bool front; // the ray hits the triangle's front
 };
 
 ShadingFrame shading_frame(Surface surface, vec3 incoming) {
     bool front = dot(incoming, surface.geometric_normal) < 0.0;
     float side = front ? 1.0 : -1.0;
     ShadingFrame frame = ShadingFrame(side * surface.geometric_normal, side * surface.shading_normal, front);
-    // Past the horizon of the shading normal (at silhouettes of tessellated shapes) the geometric one stands in.
+    // Below the horizon of the shading normal (at silhouettes of tessellated shapes) the geometric normal is used.
     if (dot(incoming, frame.shading_normal) >= 0.0) {
         frame.shading_normal = frame.geometric_normal;
     }
@@ -27,11 +28,11 @@ struct SurfaceInteraction {
     Material material;
     ShadingFrame frame;
     float opacity; // see Interface
-    bool hidden;   // a boundary inside of something of lower rank: nothing but its tint counts
+    bool hidden;   // a boundary inside a medium of lower rank: only its tint counts
     float outside; // index of refraction on the outer side
-    vec3 tint;     // of all boundaries of dielectrics there
-    Media through; // that the ray came through
-    Media beyond;  // behind boundaries of dielectrics
+    vec3 tint;     // of all dielectric boundaries at the hit
+    Media through; // in front of the boundaries
+    Media beyond;  // behind the boundaries
 };
 
 SurfaceInteraction no_interaction() {
@@ -48,8 +49,8 @@ bool finds_coincident_faces() {
     return finds;
 }
 
-// The face that a ray meets where it hits, if several lie there.
-Hit face_met(Hit hit, vec3 incoming, Random random) {
+// The face with the highest priority of those that coincide at a hit.
+Hit preferred_face(Hit hit, vec3 incoming, Random random) {
     if (finds_coincident_faces()) {
         hit = coincident_interfaces(hit, incoming, IN_VACUUM, false, random).hit;
     }
@@ -63,7 +64,7 @@ SurfaceInteraction interact(Hit hit, vec3 incoming, Media media, bool culls, Ran
     } else {
         place.opacity = opacity(hit);
     }
-    // Textures come first: what is known of the surface would hold registers.
+    // Textures come first: the surface would hold registers.
     MaterialPoint point = material_point(place.hit);
     Surface surface = surface_at(place.hit);
     Material material = textured_material(surface.material, point);
@@ -95,7 +96,7 @@ SurfaceInteraction interact(Hit hit, vec3 incoming, Media media, bool culls, Ran
     return met;
 }
 
-// Whether light passes the face that a ray hits unbent, as a shadow ray takes it, and what it leaves of that.
+// Whether light passes a face without refraction, as shadow rays assume, and the tint of the face.
 bool passes_unbent(Hit hit, out vec3 tint) {
     Material material = material_at(shading_triangle(hit.triangle).material);
     tint = material.base_color;
@@ -106,7 +107,7 @@ bool is_glass(Surface surface) {
     return is_dielectric(material_at(surface.material));
 }
 
-// Whether faces that are no dielectrics' may lie in one place.
+// Whether faces that are not dielectric may coincide.
 bool faces_coincide() {
     return COINCIDENCE;
 }

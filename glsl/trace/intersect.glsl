@@ -11,17 +11,17 @@ layout(constant_id = 26) const bool COINCIDENCE = false;
 uniform usamplerBuffer Bvh;
 uniform usamplerBuffer HavelTriangles;
 
-// Loop iterations that this invocation has made. Some drivers end every loop of an invocation, without a word, once it
-// has made 65,535 of them: the stages stop before and count what they cut short.
+// Loop iterations of this invocation. Some drivers silently end every loop of an invocation after 65,535 of them: the stages stop
+// earlier and count what they cut short.
 uint loop_count = 0u;
-bool loops_cut = false; // some traversal of this invocation was ended early
+bool loops_cut = false; // a traversal of this invocation was ended early
 
 bool loops_left() {
     return loop_count < settings.loop_limit;
 }
 
-// How far a search has come along a ray: hits count that come later, those at the same distance in the order of instances and
-// triangles. So a ray goes on past a face that it passes, and misses none that lies in the same place.
+// The position of a search along a ray: only later hits count, at the same distance in the order of instances and triangles. So a
+// ray that passes a face continues behind it and misses no coincident face.
 struct Progress {
     float t;
     PlacedTriangle at;
@@ -37,7 +37,7 @@ bool comes_first(PlacedTriangle a, PlacedTriangle b) {
     return a.instance == b.instance ? a.triangle < b.triangle : a.instance < b.instance;
 }
 
-// Whether a hit at this distance counts, and is nearer than the nearest so far.
+// Whether a hit at this distance counts and is nearer than the nearest one so far.
 bool is_nearer(float t, PlacedTriangle at, Progress progress, Hit hit) {
     bool later = t > progress.t;
     bool nearer = t < hit.t;
@@ -48,7 +48,7 @@ bool is_nearer(float t, PlacedTriangle at, Progress progress, Hit hit) {
     return later && nearer;
 }
 
-// A ray and coordinates in which it is an axis: `across` and `up` vanish along it.
+// A ray, and coordinates in which it is an axis: `across` and `up` are 0 along it.
 struct Ray {
     vec3 origin;
     vec3 direction;
@@ -61,7 +61,7 @@ Ray ray_frame(vec3 origin, vec3 direction) {
     Ray ray;
     ray.origin = origin;
     ray.direction = direction;
-    // Sheared along the axis that the ray is nearest to.
+    // Sheared along the dominant axis of the ray.
     if (size.x >= size.y && size.x >= size.z) {
         float inverse = 1.0 / direction.x;
         ray.across = vec3(-direction.y * inverse, 1.0, 0.0);
@@ -78,7 +78,7 @@ Ray ray_frame(vec3 origin, vec3 direction) {
     return ray;
 }
 
-// Where a corner lies beside the ray: a function of the corner alone, the same for all triangles that share it.
+// The position of a corner relative to the ray: a function of the corner alone, the same for all triangles that share it.
 vec2 beside(Ray ray, vec3 corner) {
     precise vec3 from = corner - ray.origin;
     precise vec2 result = vec2(dot(ray.across, from), dot(ray.up, from));
@@ -106,7 +106,7 @@ bool intersect_watertight(Ray ray, vec3 corner0, vec3 corner1, vec3 corner2, Pla
         vec3 n = cross(corner1 - corner0, corner2 - corner0);
         float t = dot(n, corner0 - ray.origin) / dot(n, ray.direction);
         float sum = sides.x + sides.y + sides.z;
-        // The sum is 0 of a triangle that the ray sees edge on.
+        // The sum is 0 if the ray lies in the triangle's plane.
         accepted = is_nearer(t, at, progress, hit) && sum != 0.0;
         if (accepted) {
             float inverse = 1.0 / sum;
@@ -137,8 +137,8 @@ bool intersect_havel(vec3 origin, vec3 direction, PlacedTriangle at, Progress pr
     return accepted;
 }
 
-// A ray as the boxes of a hierarchy see it, in the space of its triangles. Where that isn't render space, the ray is rounded,
-// and so are the triangles' places: `low` and `high` are the origin and what the boxes are widened by, both ways.
+// A ray for the boxes of a hierarchy, in the space of its triangles. If that is not render space, the ray and the triangles'
+// positions are rounded: `low` and `high` are the origin, minus and plus the margin of the boxes.
 struct LocalRay {
     vec3 origin;
     vec3 direction;
@@ -158,16 +158,16 @@ LocalRay in_render_space(Ray ray) {
     return LocalRay(ray.origin, ray.direction, ray.origin, ray.origin, inverse_of(ray.direction));
 }
 
-// A few roundings of 2^-24: of a row's factors, its products, their sum and that with what the boxes are widened by.
+// A few roundings of 2^-24: of a row's factors, its products, their sum, and the sum with the margin of the boxes.
 const float ROW_ROUNDINGS = 8.0 / 16777216.0;
 
-// The ray in the space of an instance's triangles, given the rows of the map there and what roundings of the triangles' places
-// come to there. t stays the same.
+// The ray in the space of an instance's triangles, given the rows of the map to that space and the rounding error of the
+// triangles' positions there. t stays the same.
 LocalRay in_instance(Ray ray, mat3x4 rows, float widening) {
     vec3 d = vec3(dot(rows[0].xyz, ray.direction), dot(rows[1].xyz, ray.direction), dot(rows[2].xyz, ray.direction));
     vec3 o = vec3(dot(rows[0].xyz, ray.origin), dot(rows[1].xyz, ray.origin), dot(rows[2].xyz, ray.origin)) +
              vec3(rows[0].w, rows[1].w, rows[2].w);
-    // The sizes of the terms bound the rounding. The ray has left the triangles, which lie within ±1, at t = `last`.
+    // The magnitudes of the terms bound the rounding. At t = `last` the ray has left the triangles, which lie within ±1.
     vec3 of_d = vec3(dot(abs(rows[0].xyz), abs(ray.direction)), dot(abs(rows[1].xyz), abs(ray.direction)),
                      dot(abs(rows[2].xyz), abs(ray.direction)));
     vec3 of_o = vec3(dot(abs(rows[0]), vec4(abs(ray.origin), 1.0)), dot(abs(rows[1]), vec4(abs(ray.origin), 1.0)),
@@ -204,39 +204,39 @@ float enter_box(vec3 box_min, vec3 box_max, LocalRay ray, float limit) {
 
 // No hierarchy is deeper than 64. One entry more, since compilers that turn arrays of up to 256 bytes into registers spill here.
 const uint STACK_SIZE = 65u;
-const uint FIRST_KEPT_BY_KERNEL = 34u; // the room has those before
+const uint FIRST_KEPT_BY_KERNEL = 34u; // those before belong to glsl/trace
 const uint KEPT_SIZE = 47u;
 
-// Memory of an invocation: the stack of a traversal, and behind it what waits until that has ended, since registers are scarce
-// there.
-uint lane_memory[STACK_SIZE + KEPT_SIZE];
+// Private memory of an invocation: the stack of a traversal, and behind it values that are needed after the traversal, because
+// registers are scarce during it.
+uint private_memory[STACK_SIZE + KEPT_SIZE];
 
 void keep(uint at, vec3 value) {
-    lane_memory[STACK_SIZE + at] = floatBitsToUint(value.x);
-    lane_memory[STACK_SIZE + at + 1u] = floatBitsToUint(value.y);
-    lane_memory[STACK_SIZE + at + 2u] = floatBitsToUint(value.z);
+    private_memory[STACK_SIZE + at] = floatBitsToUint(value.x);
+    private_memory[STACK_SIZE + at + 1u] = floatBitsToUint(value.y);
+    private_memory[STACK_SIZE + at + 2u] = floatBitsToUint(value.z);
 }
 
 vec3 kept(uint at) {
-    return vec3(uintBitsToFloat(lane_memory[STACK_SIZE + at]), uintBitsToFloat(lane_memory[STACK_SIZE + at + 1u]),
-                uintBitsToFloat(lane_memory[STACK_SIZE + at + 2u]));
+    return vec3(uintBitsToFloat(private_memory[STACK_SIZE + at]), uintBitsToFloat(private_memory[STACK_SIZE + at + 1u]),
+                uintBitsToFloat(private_memory[STACK_SIZE + at + 2u]));
 }
 
 void keep(uint at, uvec4 value) {
-    lane_memory[STACK_SIZE + at] = value.x;
-    lane_memory[STACK_SIZE + at + 1u] = value.y;
-    lane_memory[STACK_SIZE + at + 2u] = value.z;
-    lane_memory[STACK_SIZE + at + 3u] = value.w;
+    private_memory[STACK_SIZE + at] = value.x;
+    private_memory[STACK_SIZE + at + 1u] = value.y;
+    private_memory[STACK_SIZE + at + 2u] = value.z;
+    private_memory[STACK_SIZE + at + 3u] = value.w;
 }
 
 uvec4 kept_bits(uint at) {
-    return uvec4(lane_memory[STACK_SIZE + at], lane_memory[STACK_SIZE + at + 1u], lane_memory[STACK_SIZE + at + 2u],
-                 lane_memory[STACK_SIZE + at + 3u]);
+    return uvec4(private_memory[STACK_SIZE + at], private_memory[STACK_SIZE + at + 1u], private_memory[STACK_SIZE + at + 2u],
+                 private_memory[STACK_SIZE + at + 3u]);
 }
 
-const float TIE = 16.0 / 16777216.0; // of a distance, that rounding may change
+const float TIE = 16.0 / 16777216.0; // relative error of distances by rounding
 
-// Rows of the map back.
+// Rows of the inverse map.
 mat3x4 inverse_rows(mat3x4 rows) {
     mat3 inverse = inverse(mat3(rows[0].xyz, rows[1].xyz, rows[2].xyz));
     vec3 from = vec3(rows[0].w, rows[1].w, rows[2].w);
@@ -299,14 +299,14 @@ layout(constant_id = 63) const bool BY_HIERARCHY = false;
 Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
     Hit hit = Hit(limit, 0.0, 0.0, MISS, NO_INSTANCE);
     LocalRay local = in_render_space(ray);
-    uint instance = NO_INSTANCE; // that the lane is in
-    uint outside = STACK_SIZE; // the depth of the stack at which it leaves that
+    uint instance = NO_INSTANCE; // of the current node
+    uint outside = STACK_SIZE;   // depth of the stack at which the instance is left
     uint depth = 0u;
-    uint limit_of_loops = settings.loop_limit; // kept at hand: some drivers load it anew in each step
+    uint limit_of_loops = settings.loop_limit; // a copy, because some drivers load settings again in each step
     uint reference = 0u;
     bool complete = false;
-    bool over = false; // any hit was asked for and found
-    // A step takes a node or a triangle, whichever the lane is at: no lane of a subgroup waits for another's leaf.
+    bool over = false; // any hit was requested and found
+    // A step processes a node or a triangle, so that no invocation of a subgroup waits for another's leaf.
     do {
         loop_count += 1u;
         bool is_leaf = (reference & LEAF) != 0u;
@@ -322,7 +322,7 @@ Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle igno
             bool tests = index != ignored.triangle;
             if (INSTANCED) {
                 if (instance != NO_INSTANCE) {
-                    // Loaded anew for each triangle: kept at hand they would be twelve registers.
+                    // Loaded again for each triangle: otherwise they would take twelve registers.
                     mat3x4 rows = instance_at(instance).rows;
                     corner0 = placed(rows, corner0);
                     corner1 = placed(rows, corner1);
@@ -345,7 +345,7 @@ Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle igno
                 }
             }
         } else {
-            // Rounding puts faces in one place a little behind each other.
+            // Rounding changes the order of coincident faces.
             float reached = COINCIDENCE ? hit.t * (1.0 + TIE) : hit.t;
             float enter_left = enter_box(record.row0.xyz, record.row1.xyz, local, reached);
             float enter_right = enter_box(record.row2.xyz, record.row3.xyz, local, reached);
@@ -357,8 +357,8 @@ Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle igno
             push = max(enter_left, enter_right) < 1e30;
             pop = min(enter_left, enter_right) >= 1e30;
         }
-        // Written whether it counts or not: stores under a condition are far dearer on drivers that carry lanes in SIMD.
-        lane_memory[depth] = far_child;
+        // Written unconditionally: conditional stores are expensive on drivers that run invocations in SIMD.
+        private_memory[depth] = far_child;
         depth += push ? 1u : 0u;
         if (pop) {
             if (INSTANCED) {
@@ -370,14 +370,14 @@ Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle igno
             }
             complete = depth == 0u;
             depth = max(depth, 1u) - 1u;
-            reference = lane_memory[depth];
+            reference = private_memory[depth];
         }
     } while (!complete && !over && loop_count < limit_of_loops);
     loops_cut = loops_cut || !(complete || over);
     return hit;
 }
 
-// The nearest triangle but `ignored` after `progress` and before t = limit. With any_hit: some triangle there.
+// The nearest triangle except `ignored` after `progress` and before t = limit; with any_hit, any such triangle.
 Hit trace_from(vec3 origin, vec3 direction, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
     Ray ray = ray_frame(origin, direction);
     Hit hit = NO_HIT;

@@ -1,5 +1,5 @@
-// The solid dielectrics that a ray is in. Where several overlap, the one of the lowest rank is there, and the boundaries of the
-// others don't count: Schmidt and Budge, «Simple Nested Dielectrics in Ray Traced Images», Journal of Graphics Tools 7(2), 2002.
+// The solid dielectrics that a ray is in. Where several overlap, the one with the lowest rank counts, and the boundaries of the
+// others are ignored: Schmidt and Budge, «Simple Nested Dielectrics in Ray Traced Images», Journal of Graphics Tools 7(2), 2002.
 #ifndef TRACE_MEDIA
 #define TRACE_MEDIA
 
@@ -10,7 +10,7 @@ layout(constant_id = 13) const bool ABSORPTION = false;
 layout(constant_id = 27) const bool NESTED = false;
 layout(constant_id = 32) const bool IMMERSED = false; // paths start in dielectrics
 
-// Their names in order, VACUUM where there are fewer. Of more than four the highest ranks are forgotten.
+// Media in ascending order, filled up with VACUUM. Of more than four, the highest ranks are dropped.
 struct Media {
     uint first;
     uvec3 others; // NESTED
@@ -18,12 +18,12 @@ struct Media {
 
 const Media IN_VACUUM = Media(VACUUM, uvec3(VACUUM));
 
-// A medium's name: its object's rank, then its material. VACUUM comes last.
+// A medium: its object's rank, then its material. VACUUM comes last.
 uint medium_of(Surface surface) {
     return (surface.flags & ~RANK_BELOW) | surface.material;
 }
 
-// Of a path that starts in these.
+// The media of a path that starts in these.
 Media media_from(uvec4 names) {
     Media media = IN_VACUUM;
     if (IMMERSED) {
@@ -70,8 +70,8 @@ float ior_of_medium(uint medium) {
     return medium == VACUUM ? 1.0 : material_at(material_of_medium(medium)).ior;
 }
 
-// What a ray leaves at the back of a face that bounds this medium. If it isn't in that, the face is a wall that is an object of
-// its own: it leaves what is most like it.
+// The medium that a ray leaves at the back of a face that bounds this medium. If the ray is not in it, the face is a wall that is
+// a separate object: the ray leaves the most similar medium.
 uint left_medium(Media media, uint medium) {
     uint left = medium;
     if (NESTED) {
@@ -90,9 +90,9 @@ uint left_medium(Media media, uint medium) {
     return left;
 }
 
-// In the invocation's memory.
+// In private memory.
 void keep_media(uint at, Media media) {
-    lane_memory[STACK_SIZE + at] = media.first;
+    private_memory[STACK_SIZE + at] = media.first;
     if (NESTED) {
         keep(at, uvec4(media.first, media.others));
     }
@@ -100,14 +100,14 @@ void keep_media(uint at, Media media) {
 
 Media kept_media(uint at) {
     Media media = IN_VACUUM;
-    media.first = lane_memory[STACK_SIZE + at];
+    media.first = private_memory[STACK_SIZE + at];
     if (NESTED) {
         media.others = kept_bits(at).yzw;
     }
     return media;
 }
 
-// What a medium leaves of light over a distance.
+// Transmittance of a medium over a distance.
 vec3 transmittance(uint medium, float distance) {
     vec3 left = vec3(1.0);
     if (ABSORPTION) {
@@ -117,7 +117,7 @@ vec3 transmittance(uint medium, float distance) {
     return left;
 }
 
-// What a face bounds for a ray that meets it in these media.
+// The medium that a face bounds for a ray in these media.
 uint bounded_medium(Media media, Surface surface, bool front) {
     uint medium = medium_of(surface);
     return front ? medium : left_medium(media, medium);

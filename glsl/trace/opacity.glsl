@@ -1,4 +1,4 @@
-// Rays past surfaces that aren't there everywhere. Include after common/random.glsl.
+// Opacity by alpha: rays that pass partly transparent surfaces. Include after common/random.glsl.
 #ifndef TRACE_OPACITY
 #define TRACE_OPACITY
 
@@ -11,21 +11,21 @@ bool is_see_through(uint flags) {
     return ALPHA && (flags & SEE_THROUGH) != 0u;
 }
 
-// The chance that a ray finds a surface there.
+// The probability that a ray hits the surface.
 float opacity(Hit hit) {
-    float there = 1.0;
+    float result = 1.0;
     if (is_see_through(shading_triangle(hit.triangle).flags)) {
-        there = opacity_at(hit);
+        result = opacity_at(hit);
     }
-    return there;
+    return result;
 }
 
-// Decides whether a ray finds a face there that isn't there everywhere: a pure function of the ray's place in its path.
-float of_face(Random random, PlacedTriangle at) {
+// The random number that decides whether a ray hits a partly transparent face: a pure function of the ray's position in its path.
+float opacity_number(Random random, PlacedTriangle at) {
     return number_of(random, uvec2(at.triangle, at.instance + 1u));
 }
 
-// As `trace_from`, by chance through what is there in part.
+// As `trace_from`, passing partly transparent faces at random.
 Hit trace_visible(vec3 origin, vec3 direction, Progress progress, float t_max, PlacedTriangle ignored, bool any,
                   Random random) {
     Hit hit = NO_HIT;
@@ -35,7 +35,7 @@ Hit trace_visible(vec3 origin, vec3 direction, Progress progress, float t_max, P
             hit = trace_from(origin, direction, progress, t_max, ignored, false);
             goes_on = hit.triangle != MISS && !loops_cut;
             if (goes_on) {
-                goes_on = of_face(random, triangle_of(hit)) >= opacity(hit);
+                goes_on = opacity_number(random, triangle_of(hit)) >= opacity(hit);
                 progress = past(hit);
             }
         }

@@ -1,9 +1,8 @@
-// Rays that the device traces itself (VK_KHR_ray_query). Stages that trace are compiled a second time with RAY_QUERY, for devices
-// that can load it.
+// Ray queries (VK_KHR_ray_query). Stages that trace rays are compiled a second time with RAY_QUERY, for devices that can load it.
 
-// Instance 0 has the triangles in render space; the others follow in the order of Instances. What the device knows of a triangle is
-// its box: it finds the boxes that a ray enters, and the tests of intersect.glsl decide. So hits are the same as by the other searches,
-// to the bit and on every device, and no ray passes an edge by a device's own rounding.
+// Instance 0 has the triangles in render space; the others follow in the order of Instances. The device gets only the box of each
+// triangle: it finds the boxes that a ray enters, and the tests of intersect.glsl decide. So hits equal those of the other
+// searches to the bit, on every device, and no ray passes between triangles by a device's rounding.
 layout(set = 1, binding = 0) uniform accelerationStructureEXT Tlas;
 
 Hit trace_by_query(Ray ray, Progress progress, float limit, PlacedTriangle ignored, bool any_hit) {
@@ -39,7 +38,7 @@ Hit trace_by_query(Ray ray, Progress progress, float limit, PlacedTriangle ignor
         }
         if (at != ignored && intersect_triangle(ray, local, corner0, corner1, corner2, at, progress, hit)) {
             over = any_hit;
-            // The device goes on with boxes that begin before that. Rounding puts faces in one place a little behind each other.
+            // The device continues with boxes that begin before this distance. Rounding changes the order of coincident faces.
             rayQueryGenerateIntersectionEXT(query, min(hit.t * (1.0 + TIE), 1e30));
         }
     }

@@ -1,4 +1,4 @@
-// Triangles, where instances put them, and the surfaces that they make.
+// Triangles, their placement by instances, and surfaces.
 #ifndef TRACE_TRIANGLES
 #define TRACE_TRIANGLES
 
@@ -13,10 +13,10 @@ const uint NO_INSTANCE = 0xffffffffu;
 
 const uint RANK_BELOW = 0xffffu; // bits of flags below RANK
 
-// A triangle, and the instance that puts it where it is.
+// A triangle of an instance.
 struct PlacedTriangle {
     uint triangle; // MISS for none
-    uint instance; // NO_INSTANCE of one in render space
+    uint instance; // NO_INSTANCE if it is in render space
 };
 
 const PlacedTriangle NO_TRIANGLE = PlacedTriangle(MISS, NO_INSTANCE);
@@ -37,7 +37,8 @@ bool is_mirrored(Instance instance) {
     return (instance.flags & MIRRORED) != 0u;
 }
 
-// Where a map puts a point: the same for all triangles that share a corner, and `Placement::point` in src/scene/placement.rs.
+// Transforms a point: bit for bit the same for all triangles that share a corner, and in `Placement::point` of
+// src/scene/placement.rs.
 vec3 placed(mat3x4 rows, vec3 p) {
     precise vec3 result = vec3(rows[0].x * p.x + rows[0].y * p.y + rows[0].z * p.z + rows[0].w,
                                rows[1].x * p.x + rows[1].y * p.y + rows[1].z * p.z + rows[1].w,
@@ -59,7 +60,7 @@ struct Hit {
 
 const Hit NO_HIT = Hit(0.0, 0.0, 0.0, MISS, NO_INSTANCE);
 
-// A place of a triangle, as a ray that meets it there finds it.
+// A point of a triangle, as a ray that hits it there finds it.
 Hit hit_at(PlacedTriangle at, vec2 uv) {
     return Hit(0.0, uv.x, uv.y, at.triangle, at.instance);
 }
@@ -68,10 +69,10 @@ PlacedTriangle triangle_of(Hit hit) {
     return PlacedTriangle(hit.triangle, hit.instance);
 }
 
-// Where a ray met a surface.
+// The surface at a hit.
 struct Surface {
     vec3 position;
-    vec3 reach;            // largest coordinates of the triangle's corners, or what those are sums of, without their signs
+    vec3 reach;            // largest absolute coordinates of the triangle's corners, or of the terms that they are sums of
     vec3 geometric_normal; // of the triangle's front
     vec3 shading_normal;   // on the same side
     vec3 coat_normal;      // likewise, of a clear coat
@@ -82,12 +83,12 @@ struct Surface {
     uint flags;
 };
 
-// The matrix that takes normals along, up to their length: its rows, as columns.
+// The matrix for normals, up to their length: its rows, as columns.
 mat3 normal_rows(Instance instance) {
     vec3 x = instance.rows[0].xyz;
     vec3 y = instance.rows[1].xyz;
     vec3 z = instance.rows[2].xyz;
-    // The products of small numbers shall not vanish.
+    // Products of small numbers must not underflow.
     vec3 largest = max(max(abs(x), abs(y)), abs(z));
     float scale = 1.0 / max(max(largest.x, largest.y), largest.z);
     x *= scale;
@@ -97,7 +98,7 @@ mat3 normal_rows(Instance instance) {
     return side * mat3(cross(y, z), cross(z, x), cross(x, y));
 }
 
-// Of so smooth a surface, by the weights of the corners.
+// The interpolated normal, by the weights of the corners.
 vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_normal, uint instance) {
     vec3 normal = geometric_normal;
     if ((triangle.flags & SMOOTH_SHADED) != 0u) {
@@ -118,7 +119,7 @@ vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_norma
     return normal;
 }
 
-// The point is rebuilt from the barycentric coordinates: unlike origin + t·direction its error doesn't grow with t.
+// The position is computed from the barycentric coordinates: unlike that of origin + t·direction, its error does not grow with t.
 Surface surface_at(Hit hit) {
     ShadingTriangle triangle = shading_triangle(hit.triangle);
     vec3 p0 = triangle.p0.xyz;
@@ -131,7 +132,7 @@ Surface surface_at(Hit hit) {
         p0 = placed(instance.rows, p0);
         p1 = placed(instance.rows, p1);
         p2 = placed(instance.rows, p2);
-        // So much the corners are uncertain by against those of other objects in the same place.
+        // The uncertainty of the corners relative to those of coincident objects.
         reach = vec3(dot(abs(instance.rows[0]), vec4(1.0)), dot(abs(instance.rows[1]), vec4(1.0)),
                      dot(abs(instance.rows[2]), vec4(1.0)));
         side = is_mirrored(instance) ? -1.0 : 1.0;
@@ -155,15 +156,15 @@ Surface surface_at(Hit hit) {
     return surface;
 }
 
-// Moves a ray's origin off its surface, to the side of n, by a bound of the rounding errors of the position and of the
-// triangle's plane, both a few roundings of the corners' coordinates: Pharr, Jakob and Humphreys, «Physically Based
-// Rendering», 3rd edition, 2016, section 3.9.5. Near the origin, where floats are fine, so is the step: what lies a
-// hundred-millionth of the scene away isn't jumped over.
+// Offsets a ray's origin from its surface, to the side of n, by a bound of the rounding errors of the position and of the
+// triangle's plane, both a few roundings of the corners' coordinates: Pharr, Jakob and Humphreys, «Physically Based Rendering»,
+// 3rd edition, 2016, section 3.9.5. Near the origin of space, where floats are fine, the offset is small as well: it does not
+// skip what is a hundred-millionth of the scene away.
 vec3 offset_origin(vec3 p, vec3 n, vec3 reach) {
     return p + ROUNDINGS * dot(abs(n), reach) * n;
 }
 
-// A ray that leaves the surface starts on the side that it flies to.
+// The origin of a ray that leaves the surface in this direction.
 vec3 origin_towards(Surface surface, vec3 direction) {
     vec3 n = surface.geometric_normal;
     return offset_origin(surface.position, dot(direction, n) >= 0.0 ? n : -n, surface.reach);
