@@ -15,15 +15,15 @@ use rayon::prelude::*;
 use crate::layout::{BvhRecord, LEAF, PLACEMENT_RECORD, RAY_RECORD};
 use crate::scene::{Placement, Scene};
 
-/// Levels of inner nodes at the most, of both hierarchies that a ray is in together: entries of the traversal's stack in
-/// `glsl/trace/intersect.glsl`, but for one that is written and not read.
+/// Maximum number of levels of inner nodes, of both hierarchies that a ray is in together: the entries of the traversal's stack
+/// in `glsl/trace/intersect.glsl`, except one that is written and never read.
 const MOST_LEVELS: u32 = 63;
-/// Levels of shared triangles' hierarchies where render space's leaves as many.
+/// Maximum number of levels of shared triangles' hierarchies, if that of render space leaves them.
 const SHARED_LEVELS: u32 = 40;
-/// Triangles of a leaf at the most.
+/// Maximum number of triangles in a leaf.
 const LEAF_TRIANGLES: usize = 4;
-/// Triangles and instances at the most: the device counts four texels a record, and records are fewer than three times as
-/// many.
+/// Maximum number of triangles and instances: the device counts four texels per record, and there are fewer than three times as
+/// many records.
 const MOST_ITEMS: usize = 1 << 27;
 
 /// A hierarchy over triangles and instances.
@@ -37,11 +37,11 @@ pub struct Bvh {
     pub shared: Vec<Range<u32>>,
 }
 
-/// Shared triangles, put somewhere.
+/// A placement of shared triangles.
 pub struct PlacedMesh {
-    /// Which shared triangles.
+    /// Index of the range of shared triangles.
     pub shared: usize,
-    /// Where.
+    /// The transform.
     pub placement: Placement,
 }
 
@@ -92,7 +92,7 @@ pub fn build(scene: &Scene, shared: &[Range<u32>], instances: &[PlacedMesh]) -> 
     Ok(bvh)
 }
 
-/// Levels of inner nodes over so many triangles or instances that are split in halves.
+/// Levels of inner nodes over this number of triangles or instances, split in halves.
 fn levels_of_halves(items: usize) -> u32 {
     items.max(1).next_power_of_two().ilog2()
 }
@@ -104,14 +104,14 @@ fn bounds(points: impl Iterator<Item = Vec3>) -> Aabb {
     })
 }
 
-/// An instance as the hierarchy of render space has it.
+/// An instance in the hierarchy of render space.
 struct Placed {
     root: u32,
     placement: Placement,
     bounds: Aabb,
 }
 
-/// What a hierarchy is built over: triangles, then instances.
+/// The items of a hierarchy: triangles, then instances.
 struct Items {
     /// Index in the scene, and corners.
     triangles: Vec<(u32, [Vec3; 3])>,
@@ -145,7 +145,8 @@ impl Items {
         (self, tree)
     }
 
-    /// Whether these are the content of one leaf: an instance has its own, so that no other is entered for its box.
+    /// Whether these are the content of one leaf. An instance has a leaf of its own, so that a ray enters no other instance
+    /// because of its box.
     fn fit_leaf(&self, items: &[u32]) -> bool {
         let only_triangles = items.iter().all(|&item| (item as usize) < self.triangles.len());
         items.len() <= if only_triangles { LEAF_TRIANGLES } else { 1 }
@@ -158,13 +159,13 @@ struct Packing<'a> {
     tree: &'a Bvh2,
     /// Triangles and instances below each node of the tree.
     counts: Vec<usize>,
-    /// Levels of inner nodes at the most.
+    /// Maximum number of levels of inner nodes.
     levels: u32,
     /// The next triangle in the order of the leaves.
     next: u32,
 }
 
-/// A part of the hierarchy that is still to be packed.
+/// A part of the hierarchy that is not packed yet.
 enum Subtree {
     /// A node of the built tree.
     Built(usize),
@@ -172,7 +173,7 @@ enum Subtree {
     Halves(Vec<u32>),
 }
 
-/// An inner node that is still to be packed.
+/// An inner node that is not packed yet.
 struct Pending {
     children: [Subtree; 2],
     /// The record that refers to it, and whether as its right child.
@@ -192,8 +193,8 @@ impl<'a> Packing<'a> {
         }
     }
 
-    /// Packs the tree depth first, so that near nodes lie near each other; its root into a record that is there. Returns how
-    /// many levels of inner nodes it has.
+    /// Packs the tree depth first, so that near nodes are near in memory; its root into an existing record. Returns the number of
+    /// levels of inner nodes.
     fn pack(mut self, root_record: usize) -> u32 {
         let root = self.cut(Subtree::Built(0), 0);
         let children = match self.leaf(&root) {
@@ -271,9 +272,9 @@ impl<'a> Packing<'a> {
         }
     }
 
-    /// The subtree itself, or its items: where it lies so deep that only halves find room, which take one level for each bit
-    /// of their number (where boxes overlap, as those of slivers do, the builder may split off one triangle at a time), and
-    /// where a leaf has more than an instance.
+    /// The subtree itself, or its items to be split in halves: if it is so deep that only halves fit, which take one level for
+    /// each bit of the number of items (where boxes overlap, as those of slivers do, the builder may split off one triangle at a
+    /// time), and if a leaf has more than an instance.
     fn cut(&self, subtree: Subtree, level: u32) -> Subtree {
         let Subtree::Built(index) = subtree else { return subtree };
         let node = &self.tree.nodes[index];

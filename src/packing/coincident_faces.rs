@@ -1,5 +1,5 @@
-//! Finds faces that lie in one place. Rounding decides which of them a ray meets first, and the step off the one would take it
-//! past the other: the kernels look for the other face where a triangle is marked.
+//! Finds coincident faces. Rounding decides which of them a ray hits first, and the offset of the next ray's origin would skip
+//! the other. So triangles are marked, and for marked triangles the kernels search for the other face.
 
 use std::collections::BTreeMap;
 
@@ -12,23 +12,23 @@ use crate::layout::{
 };
 use crate::scene::Placement;
 
-/// Triangles of all instances of a primitive that are looked at. Where there are more, dielectrics are all taken to touch
-/// something, which costs the kernels a look, and others to touch nothing.
+/// Maximum number of triangles of all instances of a primitive that are tested. With more, all dielectrics are assumed to touch
+/// something, which costs the kernels a search, and others to touch nothing.
 const MOST_PLACED: usize = 1 << 18;
-/// Nodes and leaves that are looked at for each triangle.
+/// Maximum number of nodes and leaves that are visited for each triangle.
 const MOST_VISITS: usize = 1 << 13;
-/// Beside the flags of a triangle: a face of the same object lies there and looks to the other side.
+/// In addition to the flags of a triangle: it coincides with a face of the same object that faces the other side.
 const DOUBLED: u32 = 1 << 31;
 
-/// What lies in one place.
+/// The coincident faces of a scene.
 pub(crate) struct CoincidentFaces {
     /// Of each triangle: [`TOUCHED`], [`COINCIDENT`], [`BACKED`].
     pub flags: Vec<u32>,
-    /// Whether some object has faces in one place that look to opposite sides.
+    /// Whether an object has coincident faces that face opposite sides.
     pub doubled: bool,
 }
 
-/// Finds what lies in one place, wherever instances put it. A superset where dielectrics are concerned.
+/// Finds coincident faces, also of instances. A superset for dielectrics.
 pub(crate) fn coincident_faces(
     records: &[BvhRecord],
     triangles: &[ShadingTriangle],
@@ -75,12 +75,12 @@ pub(crate) fn coincident_faces(
     CoincidentFaces { flags: found, doubled }
 }
 
-/// What may touch.
+/// The faces that may coincide.
 struct Scene<'a> {
     records: &'a [BvhRecord],
     triangles: &'a [ShadingTriangle],
     materials: &'a [Material],
-    /// Triangles that aren't shared.
+    /// Triangles that are not shared.
     faces: Vec<Face>,
     /// Of the instances.
     places: Vec<Place>,
@@ -92,11 +92,11 @@ impl Scene<'_> {
     }
 }
 
-/// Where an instance is.
+/// The placement of an instance.
 struct Place {
     placement: Placement,
     object: u32,
-    /// What its planes are uncertain by.
+    /// Uncertainty of the positions of its planes.
     reach: f32,
 }
 
@@ -110,7 +110,7 @@ impl Place {
         }
     }
 
-    /// A box around a box that it puts somewhere.
+    /// A box around a transformed box.
     fn place_box(&self, low: Vec3, high: Vec3) -> (Vec3, Vec3) {
         let centre = self.placement.point(0.5 * (low + high));
         let half = 0.5 * (high - low);
@@ -130,9 +130,9 @@ struct Face {
     object: u32,
     low: Vec3,
     high: Vec3,
-    /// What the plane is uncertain by, on both sides.
+    /// Uncertainty of the plane's position, to both sides.
     reach: f32,
-    /// The part of that which an instance makes.
+    /// The part of it that is due to an instance.
     place_reach: f32,
 }
 
@@ -172,7 +172,7 @@ impl Face {
             COINCIDENT | BACKED | DOUBLED
         };
         let xyz = |[x, y, z, _]: [f32; 4]| Vec3::new(x, y, z);
-        // The boxes of render space know nothing of what instances in them are uncertain by.
+        // The boxes of render space do not include the uncertainty of instances.
         let uncertain = Vec3::splat(scene.places.iter().map(|place| place.reach).fold(0.0, f32::max));
         let mut stack = vec![(0, None)];
         for _ in 0..MOST_VISITS {
@@ -222,11 +222,11 @@ impl Face {
                 }
             }
         }
-        // A heap of triangles in one place: what isn't looked at is taken as above.
+        // Too many triangles in one place: the assumption for those that were not visited is as above.
         if scene.is_dielectric(material) { TOUCHED } else { found }
     }
 
-    /// Whether a box around corners meets this face's.
+    /// Whether a box around corners overlaps the box of this face.
     fn is_near(&self, [a, b, c]: [Vec3; 3], reach: f32) -> bool {
         self.overlaps_box(a.min(b).min(c) - reach, a.max(b).max(c) + reach)
     }
@@ -236,7 +236,7 @@ impl Face {
         (self.low - reach).cmple(high).all() && (self.high + reach).cmpge(low).all()
     }
 
-    /// What the other face adds to the flags.
+    /// The flags that the other face adds.
     fn flags_beside(&self, other: &Self, scene: &Scene<'_>, materials: [u32; 2]) -> u32 {
         let cosine = self.normal.dot(other.normal);
         let same_object = self.object == other.object;
@@ -249,14 +249,14 @@ impl Face {
         if own.surface == DIELECTRIC {
             return if same_object { TOUCHED | DOUBLED } else { TOUCHED };
         }
-        // On what is opaque, glass makes no difference.
+        // Glass on an opaque face needs no flag.
         if others.surface == DIELECTRIC || !self.overlaps(other) {
             return 0;
         }
         let emits_through = others.flags & BACK_EMITS != 0 && others.emission != [0.0; 3] && !same_object;
         let emits = others.emission != [0.0; 3];
         match (same_object, cosine > 0.0 || emits_through) {
-            // Only where they emit it matters which of them is met.
+            // Only if they emit it matters which of them is hit.
             (true, false) if emits => DOUBLED | BACKED,
             (true, _) => DOUBLED,
             (false, true) => COINCIDENT,

@@ -1,4 +1,4 @@
-//! Lamps that a file has twice in one place: a ray meets one of them, so that one alone is a light.
+//! Lamps that a file contains twice in the same place: a ray hits one of them, so only one is a light.
 
 use std::collections::{HashMap, HashSet};
 
@@ -8,18 +8,18 @@ use super::EmissiveTriangle;
 use super::emission_distribution::EmissionDistribution;
 use crate::scene::Scene;
 
-/// Where a triangle lies, whichever of its corners comes first, what it is made of, and which way it looks if that matters.
+/// A triangle's corners in a canonical order, its material, and the side that it faces if that matters.
 type Place = ([[u32; 3]; 3], u32, bool);
 
 fn place_of(scene: &Scene, triangle: u32) -> Place {
     let object = &scene.objects[scene.triangles[triangle as usize].object as usize];
-    // −0 and 0 are one place.
+    // −0 and 0 are equal.
     let corners = scene
         .corners_of(triangle)
         .map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
     let mut sorted = corners;
     sorted.sort_unstable();
-    // An even permutation keeps the side that it looks to.
+    // An even permutation keeps the side that it faces.
     let place = |corner: &[u32; 3]| sorted.iter().position(|other| other == corner);
     let [a, b, c] = [0, 1, 2].map(|i| place(&corners[i]));
     let inversions = [a > b, a > c, b > c].into_iter().filter(|inverted| *inverted).count();
@@ -27,8 +27,8 @@ fn place_of(scene: &Scene, triangle: u32) -> Place {
     (sorted, object.material, !two_sided && inversions % 2 == 1)
 }
 
-/// Takes out those that lie where another one of their material shines evenly to the same sides. Returns, of each, which it is
-/// and which one stays: that of the last object, which is what rays meet.
+/// Removes triangles that coincide with another one of the same material that emits evenly to the same sides. Returns pairs of
+/// the removed triangle and the one that stays: that of the last object, which rays hit.
 pub(crate) fn remove_duplicates(
     scene: &Scene,
     emissive: &mut Vec<(EmissiveTriangle, EmissionDistribution)>,

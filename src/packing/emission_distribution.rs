@@ -1,4 +1,4 @@
-//! How triangles shine over their area: the factor that textures and alpha make of their emission.
+//! The distribution of emission over triangles: the factor by which textures and alpha scale it.
 
 use glam::{DVec2, DVec3, DVec4};
 use rayon::prelude::*;
@@ -8,37 +8,37 @@ use super::part::Part;
 use crate::layout::TextureLookup;
 use crate::scene::{Alpha, Material, Scene, Triangle};
 
-/// Parts along a side of a triangle, at the most.
+/// Maximum number of parts along a side of a triangle.
 const MOST_COLUMNS: u32 = 256;
-/// Parts of all triangles together, at the most.
+/// Maximum number of parts of all triangles together.
 const MOST_PARTS: u64 = 1 << 18;
-/// Places that are asked along a side of a triangle, at the least and at the most.
+/// Minimum and maximum number of points that are evaluated along a side of a triangle.
 const ASKED: [u32; 2] = [4, 1024];
-/// Of all triangles together, about.
+/// Approximate maximum number of points of all triangles together.
 const MOST_ASKED: u64 = 1 << 22;
-/// Places for each texel along a side, and for each part: half a texel is as far as light is blended.
+/// Points for each texel along a side, and for each part: interpolation blends light over half a texel.
 const ASKED_A_TEXEL: f64 = 4.0;
 const ASKED_A_PART: u32 = 2;
-/// How many times the squared noise of what is even parts may have that are cut no further, where all of an object's triangles shine
-/// alike.
+/// Parts are not divided further if their squared noise is at most this multiple of that of even emission, for an object whose
+/// triangles all emit alike.
 const EVEN_ENOUGH: f64 = 1.1;
-/// Of a part's weight, what goes by the brightest texels that it may read: no place of a part as small as a texel shines more than
-/// 50 times above its weight.
+/// The share of a part's weight that goes by the brightest texels that it may read: no point of a part as small as a texel emits
+/// more than 50 times its weight.
 const BY_MOST: f64 = 0.02;
-/// The least mean factor: power is always positive.
+/// Minimum mean factor: power is always positive.
 const LEAST: f64 = 1e-6;
 
 /// A triangle's middle.
 const MIDDLE: DVec2 = DVec2::splat(1.0 / 3.0);
 
-/// How a triangle shines.
+/// The distribution of emission over a triangle.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct EmissionDistribution {
-    /// Mean factor of the emission, about.
+    /// Approximate mean factor of the emission.
     pub mean: f64,
     /// Parts along a side.
     pub columns: u32,
-    /// What share of the light is taken to come from each part; 0 of one that is surely dark.
+    /// The share of the light that is assumed to come from each part; 0 if it is surely dark.
     pub shares: Vec<f64>,
 }
 
@@ -49,12 +49,12 @@ impl EmissionDistribution {
         shares: Vec::new(),
     };
 
-    /// Whether nothing of it shines.
+    /// Whether no part of it emits.
     pub fn is_dark(&self) -> bool {
         self.shares == [0.0]
     }
 
-    /// Of what is dark like all else of its object, some light has to be taken to come.
+    /// For an object that is dark as a whole, some light has to be assumed.
     pub fn not_dark(&mut self) {
         self.shares.clear();
     }
@@ -64,8 +64,8 @@ impl EmissionDistribution {
         self.shares.get(number as usize).copied().unwrap_or(1.0)
     }
 
-    /// Of triangles that emit, with their powers as if there were no textures; and whether some would have to be cut into more
-    /// parts than they are.
+    /// The distributions of emissive triangles, whose powers are without textures; and whether some of them would need more
+    /// parts.
     pub fn of_all(scene: &Scene, triangles: &[EmissiveTriangle]) -> (Vec<Self>, bool) {
         let textured = triangles.par_iter().map(|light| Textured::of(scene, light.triangle));
         let textured: Vec<Option<Textured<'_>>> = textured.collect();
@@ -104,7 +104,7 @@ impl EmissionDistribution {
         let weights: Vec<f64> = level.squares.iter().zip(&level.most).map(weight).collect();
         let all: f64 = weights.iter().sum();
         Self {
-            // The texture may shine between the places that were asked.
+            // The texture may emit between the evaluated points.
             mean: level.mean.max(BY_MOST * all / weights.len() as f64).max(LEAST),
             columns: level.columns,
             shares: match weights[..] {
@@ -115,7 +115,8 @@ impl EmissionDistribution {
     }
 }
 
-/// How much noise parts of each triangle may have: what hardly shines beside the rest of its object needn't be known well.
+/// The noise that the parts of each triangle may have: a triangle that emits little compared with the rest of its object needs
+/// less precision.
 fn enough_noise(scene: &Scene, triangles: &[EmissiveTriangle], levels: &[Option<Level>]) -> Vec<f64> {
     let mean = |level: &Option<Level>| level.as_ref().map_or(1.0, |level| level.mean);
     let powers = || {
@@ -137,7 +138,7 @@ fn enough_noise(scene: &Scene, triangles: &[EmissiveTriangle], levels: &[Option<
     powers().map(enough).collect()
 }
 
-/// Half of a number, again and again, until it fits or is the least one.
+/// Halves a number until it fits or is the least one.
 fn halved_until(mut number: u32, least: u32, fits: impl Fn(u32) -> bool) -> u32 {
     while number > least && !fits(number) {
         number /= 2;
@@ -145,26 +146,26 @@ fn halved_until(mut number: u32, least: u32, fits: impl Fn(u32) -> bool) -> u32 
     number
 }
 
-/// What its parts have at some number of them.
+/// The factors of a triangle's parts, for a given number of parts.
 struct Level {
     columns: u32,
     mean: f64,
     /// Mean square of each part's factor.
     squares: Vec<f64>,
-    /// And of the largest that its places may have: 0 where it is surely dark.
+    /// The square of the largest factor that a point of each part may have: 0 if it is surely dark.
     most: Vec<f64>,
-    /// Whether more parts would be better.
+    /// Whether more parts would reduce noise.
     is_coarse: bool,
 }
 
 impl Level {
-    /// The squared noise of light that is chosen by these parts, 1 at the least.
+    /// The squared noise of light that is sampled by these parts, at least 1.
     fn noise(&self) -> f64 {
         let roots: f64 = self.squares.iter().map(|square| square.sqrt()).sum();
         (roots / (self.squares.len() as f64 * self.mean)).powi(2)
     }
 
-    /// The fewest parts that have no more noise than this, or all.
+    /// The smallest number of parts that has no more noise than this, or all.
     fn coarse_as(mut self, noise: f64) -> Self {
         let is_even = |level: &Self| level.mean <= 0.0 || level.noise() <= noise;
         self.is_coarse &= !is_even(&self);
@@ -178,7 +179,7 @@ impl Level {
         self
     }
 
-    /// With four parts in one.
+    /// Joins four parts each.
     fn halved(&self) -> Self {
         Self {
             columns: self.columns / 2,
@@ -206,12 +207,12 @@ fn halved(values: &[f64], columns: u32) -> Vec<f64> {
     means
 }
 
-/// A triangle with a texture, or corners' colours, that its emission depends on.
+/// A triangle whose emission depends on a texture or on vertex colours.
 struct Textured<'a> {
     scene: &'a Scene,
     material: &'a Material,
     emission: Option<&'a TextureLookup>,
-    /// Base colour, of which alpha counts.
+    /// Base colour; only its alpha matters.
     color: Option<&'a TextureLookup>,
     /// Both sets of coordinates, of the three corners.
     corners: [[DVec2; 2]; 3],
@@ -250,27 +251,27 @@ impl<'a> Textured<'a> {
             .fold(1.0, f64::max)
     }
 
-    /// Places that it takes to know it, along a side.
+    /// Number of points along a side that resolve it.
     fn asked(&self) -> u32 {
         let [least, most] = ASKED;
         let wanted = ASKED_A_TEXEL * self.texels().min(f64::from(most));
-        // Coordinates of textures have rounded edges.
+        // Texture coordinates are rounded.
         ((wanted - 1e-3).ceil() as u32).next_power_of_two().clamp(least, most)
     }
 
-    /// Both sets of coordinates at a place.
+    /// Both sets of coordinates at a point.
     fn sets(&self, place: DVec2) -> [DVec2; 2] {
         let [a, b, c] = self.corners;
         [0, 1].map(|set: usize| a[set] * (1.0 - place.x - place.y) + b[set] * place.x + c[set] * place.y)
     }
 
-    /// Mean of a colour's channels, weighed as the material emits them.
+    /// Mean of a colour's channels, weighted by the material's emission.
     fn emitted(&self, texel: DVec4) -> f64 {
         let emission = self.material.emission.as_dvec3();
         texel.truncate().dot(emission) / emission.element_sum()
     }
 
-    /// Factor of the emission at a place.
+    /// Factor of the emission at a point.
     fn factor(&self, place: DVec2) -> f64 {
         let texels = &self.scene.textures.texels;
         let sets = self.sets(place);
@@ -289,7 +290,7 @@ impl<'a> Textured<'a> {
         emitted * there
     }
 
-    /// With as many parts as there may be.
+    /// With the maximum number of parts.
     fn finest(&self, most_asked: u32) -> Level {
         let wanted = self.asked();
         let asked = wanted.min(most_asked);
@@ -308,7 +309,7 @@ impl<'a> Textured<'a> {
         level.coarsened(MOST_COLUMNS)
     }
 
-    /// The largest factor that places of a part may have.
+    /// The largest factor that a point of a part may have.
     fn most(&self, part: Part) -> f64 {
         let texels = &self.scene.textures.texels;
         let corners = [DVec2::ZERO, DVec2::X, DVec2::Y].map(|corner| self.sets(part.place(corner)));

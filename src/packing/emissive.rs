@@ -15,7 +15,7 @@ pub struct EmissiveTriangle {
 }
 
 impl Scene {
-    /// How many triangles emit light.
+    /// Number of triangles that emit light.
     pub fn emissive_triangle_count(&self) -> usize {
         self.emitting_objects().map(|(object, _)| object.triangles.len()).sum()
     }
@@ -31,7 +31,7 @@ impl Scene {
             .collect()
     }
 
-    /// Each with the way it shines over its area, and whether some would have to be known more finely than they are.
+    /// Each with its emission distribution, and whether some distributions would need a finer resolution.
     pub(crate) fn emission_distributions(&self) -> (Vec<(EmissiveTriangle, EmissionDistribution)>, bool) {
         let even: Vec<EmissiveTriangle> = self
             .emitting_objects()

@@ -4,13 +4,13 @@ use std::f64::consts::PI;
 
 use crate::scene::Environment;
 
-/// The part of all choices of a direction that goes by solid angle alone, so that what is dim has its turn.
+/// The share of directions that is chosen by solid angle alone, so that dim parts are sampled too.
 const UNIFORM: f64 = 0.1;
 
 impl Environment {
-    /// The picture with the probabilities by which directions are chosen, as `glsl/lights/environment.glsl` reads it: the
-    /// size, and the rotation in turns; of each row the cosines at its upper and lower edge; the pixels. w: of rows and of a row's pixels, the
-    /// probability of each and those before it.
+    /// The picture with the probabilities by which directions are chosen, as `glsl/lights/environment.glsl` reads it: the size
+    /// and the rotation in turns; each row's cosines at its upper and lower edge; the pixels. w: the cumulative probability of
+    /// rows, and of a row's pixels.
     pub(crate) fn table(&self) -> Vec<[f32; 4]> {
         let [width, height] = self.size();
         let weights = self.weights();
@@ -39,7 +39,7 @@ impl Environment {
     }
 }
 
-/// A table of no light, for scenes without an environment.
+/// An empty table, for scenes without an environment.
 pub(crate) fn no_table() -> Vec<[f32; 4]> {
     vec![
         [f32::from_bits(1), f32::from_bits(1), 0.0, 0.0],
@@ -48,8 +48,8 @@ pub(crate) fn no_table() -> Vec<[f32; 4]> {
     ]
 }
 
-/// Parts of the sum up to and with each value, in multiples of 2⁻²⁴, as random numbers are. Each value has one of them at
-/// the least, so that none is left out: what is chosen more often than it should be counts less in return.
+/// Cumulative shares of the sum, in multiples of 2⁻²⁴ like random numbers. Each value has at least one such step, so that every
+/// value can be chosen; the higher probability is accounted for by its weight.
 fn cumulative(values: &[f64]) -> Vec<f32> {
     const STEPS: f64 = (1 << 24) as f64;
     let total: f64 = values.iter().sum();

@@ -1,4 +1,4 @@
-//! Which media a point is in: paths that start in water have to know it.
+//! The media that a point is in: needed for paths that start in water.
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
@@ -10,12 +10,12 @@ use crate::scene::{Object, Scene};
 /// In no medium.
 pub(crate) const IN_VACUUM: [u32; 4] = [VACUUM; 4];
 
-/// How far from a lamp's face it is asked what it shines into, in render units: further than rays step off faces.
+/// Distance from a lamp's face at which its medium is determined, in render units: more than the offset of ray origins.
 const OFF_FACE: f32 = 1e-5;
 /// Triangles in a cell of a column grid, on average.
 const A_CELL: usize = 4;
 
-/// The solid dielectrics of a scene, to be asked what a point is in.
+/// The solid dielectrics of a scene, to find the media of a point.
 #[derive(Debug, Clone, Default)]
 pub struct Immersion {
     solids: Vec<Solid>,
@@ -23,18 +23,19 @@ pub struct Immersion {
     nested: bool,
 }
 
-/// A solid's triangles, as seen along a line that no edge is likely to be parallel to: the columns of a grid across it.
+/// A solid's triangles, projected along a line that no edge is likely to be parallel to, in the columns of a grid across the
+/// line.
 #[derive(Debug, Clone)]
 struct Solid {
     medium: u32,
     low: DVec2,
     cell: DVec2,
     cells: [usize; 2],
-    /// Of each column: where its triangles begin; and the end.
+    /// Index of each column's first triangle, and the end.
     starts: Vec<usize>,
-    /// Of the columns, one after the other.
+    /// The triangles of the columns, one column after the other.
     triangles: Vec<u32>,
-    /// Seen along the line.
+    /// Projected along the line.
     corners: Vec<[Vec3; 3]>,
 }
 
@@ -50,10 +51,10 @@ impl Immersion {
         }
     }
 
-    /// Names of the media that a point is in, the lowest first; [`u32::MAX`] where there are fewer than four.
+    /// The media that a point is in, the lowest first; [`u32::MAX`] if there are fewer than four.
     ///
-    /// A point is in a closed solid, or behind the back of an open sheet. A closed mesh whose faces look inwards is a hollow in
-    /// another one of its material.
+    /// A point is in a closed solid, or behind the back of an open sheet. A closed mesh whose faces face inwards is a cavity in
+    /// another mesh of its material.
     pub fn media_at(&self, point: Vec3) -> [u32; 4] {
         let mut media = Vec::new();
         let mut hollows = Vec::new();
@@ -79,7 +80,7 @@ impl Immersion {
         media.try_into().expect("four media")
     }
 
-    /// Of each light. What comes from afar comes from a vacuum. `corners`: of all triangles.
+    /// The media of each light. Distant light comes from a vacuum. `corners`: of all triangles.
     pub(crate) fn of_lights(&self, lights: &[Light], corners: &[[Vec3; 3]]) -> Vec<[u32; 4]> {
         if self.solids.is_empty() {
             return vec![IN_VACUUM; lights.len()];
@@ -97,7 +98,7 @@ impl Immersion {
             POINT_LIGHT | SPOT_LIGHT => self.media_at(light.position.into()),
             _ => IN_VACUUM,
         };
-        // The parts of a triangle follow each other.
+        // The parts of a triangle are consecutive.
         let mut media: Vec<[u32; 4]> = Vec::with_capacity(lights.len());
         for (index, light) in lights.iter().enumerate() {
             let is_next_part = light.kind == TRIANGLE_LIGHT && Part::of(light).number() > 0;
@@ -111,7 +112,7 @@ impl Immersion {
     }
 }
 
-/// Render space seen along the line, which is nearly vertical: open sheets of water are level.
+/// Render space projected along the line, which is nearly vertical, because open sheets of water are horizontal.
 fn view() -> DMat3 {
     let along = DVec3::new(0.061_803, 1.0, 0.041_421).normalize();
     let across = along.cross(DVec3::new(0.577_216, 0.0, 0.816_497)).normalize();
@@ -127,14 +128,14 @@ impl Solid {
         let corners: Vec<[Vec3; 3]> = triangles
             .map(|triangle| {
                 let [a, b, c] = scene.corners_of(triangle).map(seen);
-                // Where fronts become backs, the renderer turns them round.
+                // Mirrored instances exchange front and back; the renderer turns their faces round.
                 if mirrored { [a, c, b] } else { [a, b, c] }
             })
             .collect();
         Self::of_corners(medium, corners)
     }
 
-    /// corners: seen along the line.
+    /// corners: projected along the line.
     fn of_corners(medium: u32, corners: Vec<[Vec3; 3]>) -> Self {
         let all = || corners.iter().flatten().map(|corner| corner.truncate().as_dvec2());
         let low = all().fold(DVec2::INFINITY, DVec2::min);
@@ -154,7 +155,7 @@ impl Solid {
         solid
     }
 
-    /// Deals the triangles out to the columns: counted, then placed.
+    /// Distributes the triangles over the columns: counts, then places them.
     fn fill(&mut self) {
         let [columns, rows] = self.cells;
         let covered = |corners: &[Vec3; 3]| {
@@ -182,14 +183,14 @@ impl Solid {
         self.triangles = triangles;
     }
 
-    /// Of a point across the line; the nearest one where it lies outside.
+    /// The column of a point across the line; the nearest column if it lies outside.
     fn column(&self, across: DVec2) -> [usize; 2] {
         let place = (across - self.low) / self.cell;
         [0, 1].map(|axis| (place[axis] as usize).min(self.cells[axis] - 1))
     }
 
-    /// How many more backs than fronts the line meets, from a point to both of its ends: 2 within a closed solid. `seen`: along the
-    /// line.
+    /// The number of backs minus that of fronts on the line, from a point to both ends: 2 inside a closed solid. `seen`: the
+    /// point, projected.
     fn sides(&self, seen: DVec3) -> i32 {
         let across = seen.truncate();
         let [x, y] = self.column(across);
@@ -204,7 +205,7 @@ impl Solid {
             }
             let sum: f64 = weights.iter().sum();
             let height = (weights[0] * corners[0].z + weights[1] * corners[1].z + weights[2] * corners[2].z) / sum;
-            // Above the point the line leaves by a back where the normal looks up.
+            // Above the point, the line passes a back if the normal points up.
             let looks_up = sum > 0.0;
             if looks_up == (height > seen.z) { 1 } else { -1 }
         };
@@ -217,7 +218,7 @@ impl Solid {
 mod tests {
     use super::*;
 
-    /// A box whose faces look outwards, or inwards, as it is seen along the line.
+    /// A box whose faces face outwards, or inwards, projected along the line.
     fn block(medium: u32, low: Vec3, high: Vec3, inwards: bool) -> Solid {
         let corner = |i: usize| Vec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), high, low);
         let quads = [

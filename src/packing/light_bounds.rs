@@ -1,5 +1,6 @@
-//! What a source of light can bring to a point at the most: where it lies and where it shines, after Conty Estévez and Kulla,
-//! «Importance Sampling of Many Lights with Adaptive Tree Splitting», HPG 2018, and pbrt-v4's `LightBounds`.
+//! Bounds of a light source, from which the largest irradiance at a point follows: its position and its directions of emission,
+//! after Conty Estévez and Kulla, «Importance Sampling of Many Lights with Adaptive Tree Splitting», HPG 2018, and pbrt-v4's
+//! `LightBounds`.
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
@@ -16,7 +17,7 @@ use crate::scene::Environment;
 /// Cosine of the widest cone: all directions.
 const ALL_AROUND: f64 = -1.0;
 
-/// The bounds of each source, in their order. `corners`: of all triangles; `two_sided`: whether a triangle's back shines too.
+/// The bounds of each source, in their order. `corners`: of all triangles; `two_sided`: whether a triangle's back emits too.
 pub(crate) fn light_sources(
     lights: &Lights,
     corners: &[[Vec3; 3]],
@@ -38,7 +39,7 @@ pub(crate) fn light_sources(
             POINT_LIGHT | SPOT_LIGHT => of_points(common, of_source),
             DIRECTIONAL_LIGHT => of_suns(common, of_source),
             ENVIRONMENT_LIGHT => LightSource {
-                // The irradiance that an even one brings.
+                // The irradiance of a uniform environment.
                 strength: environment.map_or(0.0, |environment| 0.25 * environment.total()) as f32,
                 ..common
             },
@@ -55,7 +56,7 @@ fn of_triangles(
     corners: &[[Vec3; 3]],
     two_sided: &impl Fn(u32) -> bool,
 ) -> LightSource {
-    // Parts that are surely dark bring nothing.
+    // Parts that are surely dark emit nothing.
     let lit_parts = || {
         lights
             .iter()
@@ -103,7 +104,7 @@ fn of_points(common: LightSource, lights: &[Light]) -> LightSource {
         [spot] if spot.kind == SPOT_LIGHT => (spot.direction, 1.0 - f64::from(spot.outer)),
         _ => ([0.0; 3], ALL_AROUND),
     };
-    // 0 where any has no range.
+    // 0 if any of them has no range.
     let inverse_range = lights
         .iter()
         .map(|light| light.inverse_range)

@@ -1,19 +1,19 @@
-//! Sources: ranges of lights that photon paths are aimed from. An object's triangles are one, since they lie together.
+//! Sources: ranges of lights that photon paths are aimed from. The triangles of an object are one source.
 
 use std::ops::Range;
 
 use crate::layout::Light;
 
-/// Sources at the most: each has paths towards each target.
+/// Maximum number of sources: each has paths towards each target.
 pub const MOST_SOURCES: usize = 32;
 
-/// The part of all choices within a source that goes to each of its triangles and other lights alike instead of by power.
+/// The share of choices within a source that is equal for each of its triangles and other lights, instead of by power.
 const ALIKE: f64 = 0.1;
 
-/// What a cumulative probability is a multiple of, as random numbers are.
+/// The step of cumulative probabilities, like that of random numbers.
 const STEPS: f64 = 16_777_216.0;
 
-/// Neighbours of a kind put together until there are no more than [`MOST_SOURCES`].
+/// Joins neighbours of the same kind until there are no more than [`MOST_SOURCES`].
 pub(crate) fn bundled(lights: &[Light], sources: Vec<Range<u32>>) -> Vec<Range<u32>> {
     if sources.len() <= MOST_SOURCES {
         return sources;
@@ -30,8 +30,8 @@ pub(crate) fn bundled(lights: &[Light], sources: Vec<Range<u32>>) -> Vec<Range<u
         .collect()
 }
 
-/// Sets the cumulative probabilities of a source's lights: by power for the most part. Each has a step at least. `of_triangles`: what
-/// part of its triangle's power each has.
+/// Sets the cumulative probabilities of a source's lights, mostly by power. Each has at least one step. `of_triangles`: each
+/// light's share of its triangle's power.
 pub(crate) fn set_cumulative(lights: &mut [Light], powers: &[f64], of_triangles: &[f64]) {
     let count = lights.len() as f64;
     let total: f64 = powers.iter().sum();

@@ -13,21 +13,21 @@ use crate::alias::alias_table;
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT, TRIANGLE_LIGHT};
 use crate::scene::{LightKind, PunctualLight, Scene};
 
-/// The part of all choices of a light that goes to each object that emits, each punctual light and the environment alike
-/// instead of by flux. A light that is a million million times dimmer than another one would hardly have its turn, and
-/// where it shines alone nothing would be seen.
+/// The share of choices of a light that is equal for each emissive object, each punctual light and the environment, instead of by
+/// flux. Otherwise a light that is 10¹² times dimmer than another one would hardly be sampled, and the region that it lights
+/// alone would stay black.
 const ALIKE: f64 = 0.1;
 
-/// Distant lights' discs are so much larger than what they cover.
+/// Factor by which the discs of distant lights are larger than the scene that they cover.
 const MARGIN: f64 = 1.0 + 1e-5;
 
-/// A light and what its probability depends on.
+/// A light and the data for its probability.
 struct Candidate {
     light: Light,
     power: f64,
-    /// Part of its object's flux; 1 for what is no triangle.
+    /// Share of its object's flux; 1 if it is not a triangle.
     share: f64,
-    /// Part of its triangle's flux; 1 for what is no triangle.
+    /// Share of its triangle's flux; 1 if it is not a triangle.
     of_triangle: f64,
 }
 
@@ -35,19 +35,19 @@ struct Candidate {
 pub(crate) struct Lights {
     /// Triangles by object and in leaf order, each with its parts; punctual ones, the environment. With the alias table.
     pub lights: Vec<Light>,
-    /// What each emits, mean of RGB; 0 of what is surely dark.
+    /// Power of each light, mean of RGB; 0 if it is surely dark.
     pub powers: Vec<f64>,
-    /// Ranges of them.
+    /// Ranges of lights.
     pub sources: Vec<Range<u32>>,
-    /// What they emit together, mean of RGB.
+    /// Power of all lights, mean of RGB.
     pub power: f64,
-    /// Triangles that lie where another one shines, and that one; in leaf order.
+    /// Pairs of a duplicate and the emissive triangle that it coincides with; in leaf order.
     pub doubles: Vec<[u32; 2]>,
-    /// Whether some triangle would have to have more parts.
+    /// Whether some triangle would need more parts.
     pub is_coarse: bool,
 }
 
-/// The lights, where triangles lie in this order.
+/// The lights, for triangles in this order.
 pub(crate) fn lights(scene: &Scene, order: &[u32]) -> Lights {
     let (mut emissive, is_coarse) = scene.emission_distributions();
     let mut place = vec![0; scene.triangles.len()];
@@ -61,7 +61,7 @@ pub(crate) fn lights(scene: &Scene, order: &[u32]) -> Lights {
     let triangles = candidates.len() as u32;
     let punctual_lights = scene.lights.iter().map(|light| punctual(scene, light));
     let mut others: Vec<(Light, f64)> = punctual_lights.chain(environment(scene)).collect();
-    // Those of a kind lie together, so that they can be bundled. The environment stays the last one.
+    // Lights of a kind are consecutive, so that they can be joined. The environment stays last.
     others.sort_by_key(|(light, _)| light.kind);
     candidates.extend(others.into_iter().map(|(light, power)| Candidate {
         light,
@@ -99,7 +99,7 @@ pub(crate) fn lights(scene: &Scene, order: &[u32]) -> Lights {
     }
 }
 
-/// Gives lights the probabilities, whose sum is 1, by which they are to be chosen.
+/// Sets the probabilities of lights, whose sum is 1.
 pub(crate) fn set_alias_table(lights: &mut [Light], probabilities: &[f64]) {
     for ((light, &probability), cell) in lights.iter_mut().zip(probabilities).zip(alias_table(probabilities)) {
         light.probability = probability as f32;
@@ -163,7 +163,7 @@ fn emissive_triangles(
 
 /// A light, and its power.
 fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
-    // What comes along each direction, so that across the middle one all together is the irradiance.
+    // Irradiance across each direction, such that the sum across the middle direction is that of the light.
     let spread = match light.kind {
         LightKind::Directional { .. } => (0.5 * light.extent).cos().powi(2),
         LightKind::Point | LightKind::Spot { .. } => 1.0,
@@ -197,7 +197,7 @@ fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
         },
         LightKind::Directional { direction } => {
             let (centre, area) = if light.extent > 0.0 {
-                // Rays of many directions come in through a sphere around the scene, as an environment's do.
+                // Rays of many directions enter through a sphere around the scene, like those of an environment.
                 (DVec3::ZERO, PI * bounding_radius(scene).powi(2))
             } else {
                 disc_across(scene, direction.as_dvec3())
@@ -215,7 +215,7 @@ fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
     (packed, light.power(disc_area))
 }
 
-/// Centre and area of a disc before the scene from which parallel rays meet all of it.
+/// Centre and area of a disc in front of the scene from which parallel rays reach all of it.
 fn disc_across(scene: &Scene, direction: DVec3) -> (DVec3, f64) {
     let (mut before, mut radius2): (f64, f64) = (0.0, 0.0);
     for position in scene.corners().map(Vec3::as_dvec3) {
@@ -223,18 +223,18 @@ fn disc_across(scene: &Scene, direction: DVec3) -> (DVec3, f64) {
         before = before.max(-along);
         radius2 = radius2.max((position - along * direction).length_squared());
     }
-    // A flat scene across the light would have the disc in its plane.
+    // A flat scene across the light would lie in the plane of the disc.
     let apart = 1e-3 * radius2.sqrt();
     (-direction * (before + apart), PI * radius2 * MARGIN)
 }
 
-/// Radius of a sphere around the origin that holds the scene.
+/// Radius of a sphere around the origin that contains the scene.
 fn bounding_radius(scene: &Scene) -> f64 {
     let radius2 = scene.corners().map(Vec3::length_squared);
     f64::from(radius2.fold(0.0, f32::max)).sqrt() * MARGIN
 }
 
-/// The environment as a light, and its power: what comes in through a sphere around the scene.
+/// The environment as a light, and its power: the flux into a sphere around the scene.
 fn environment(scene: &Scene) -> Option<(Light, f64)> {
     let environment = scene.environment.as_ref()?;
     let area = PI * bounding_radius(scene).powi(2);

@@ -1,5 +1,5 @@
-//! Where a light is near: there the squared distance to its points varies without bound, and directions of the BSDF are the
-//! better way to sample it. Anywhere else points of the light alone are better, since no ray is lost.
+//! Regions near a light: the squared distance to its points varies without bound there, and BSDF samples are the better strategy.
+//! Elsewhere points of the light alone are better, because no ray misses.
 
 use std::ops::Range;
 
@@ -10,26 +10,27 @@ use super::sphere::Sphere;
 use crate::layout::{ENVIRONMENT_LIGHT, Light, TRIANGLE_LIGHT};
 use crate::scene::Environment;
 
-/// Radii of a light within which it is near: outside of it no point of it is more than three times as far as another one.
+/// Radius of the near region, in radii of the light: outside, no point of the light is more than three times as far as another
+/// one.
 const REACH: f64 = 2.0;
-/// The least and the greatest probability that a direction of the BSDF is taken near a light.
+/// Minimum and maximum probability of a BSDF sample near a light.
 const SAMPLING: [f64; 2] = [0.05, 0.5];
 
-/// Spheres in which lights are near.
+/// The data for the near regions of lights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NearLights<'a> {
     pub lights: &'a [Light],
-    /// What each emits; 0 of what is surely dark.
+    /// Power of each light; 0 if it is surely dark.
     pub powers: &'a [f64],
-    /// Ranges of them.
+    /// Ranges of lights.
     pub sources: &'a [Range<u32>],
-    /// Of all triangles, in the order of the BVH's leaves.
+    /// Corners of all triangles, in the order of the BVH's leaves.
     pub corners: &'a [[Vec3; 3]],
     pub environment: Option<&'a Environment>,
 }
 
 impl NearLights<'_> {
-    /// A sphere around each source that rays can meet: its centre, and the squared radius of what is near it. An environment is
+    /// A sphere around each source that rays can hit: its centre, and the squared radius of the near region. An environment is
     /// near everywhere.
     pub fn spheres(&self) -> Vec<[f32; 4]> {
         if self.environment.is_some() {
@@ -42,7 +43,7 @@ impl NearLights<'_> {
         self.sources.iter().filter_map(sphere).collect()
     }
 
-    /// Those of a range that shine.
+    /// The lights of a range that have power.
     fn with_power(&self, range: Range<usize>) -> impl Iterator<Item = &Light> + Clone {
         let with_powers = self.lights[range.clone()].iter().zip(&self.powers[range]);
         with_powers.filter(|(_, power)| **power > 0.0).map(|(light, _)| light)
@@ -57,9 +58,8 @@ impl NearLights<'_> {
         Some(sphere.centre.as_vec3().extend(radius2 as f32).to_array())
     }
 
-    /// Probability that a direction of the BSDF is taken near a light: about the chance that it meets one. That is the part of
-    /// the scene's area that emits, or of all directions that the environment's light comes from, half of which lie below a
-    /// surface.
+    /// Probability of a BSDF sample near a light: approximately the probability that it hits one. That is the emissive share of
+    /// the scene's area, or the share of directions that the environment's light comes from, half of which lie below a surface.
     pub fn bsdf_sampling(&self, area_of_all: f64) -> f32 {
         let environments = self.lights.iter().filter(|light| light.kind == ENVIRONMENT_LIGHT);
         let from_afar: f64 = environments

@@ -1,23 +1,23 @@
-//! Which dielectric is there where several overlap: Schmidt and Budge, «Simple Nested Dielectrics in Ray Traced Images»,
-//! Journal of Graphics Tools 7(2), 2002. Their priorities are set by hand; here the smaller volume comes first, so that a
-//! stone in water or a straw's wall stays what it is.
+//! Priorities of overlapping dielectrics: Schmidt and Budge, «Simple Nested Dielectrics in Ray Traced Images», Journal of
+//! Graphics Tools 7(2), 2002. Their priorities are set by hand; here the smaller volume has priority, so that a stone in water
+//! stays a stone.
 
 use glam::{DVec3, Vec3};
 
 use crate::scene::{Scene, Surface};
 
-/// The rank of what overlaps nothing.
+/// The rank of an object that overlaps no other.
 pub(crate) const ALONE: u32 = 0xfffe;
-/// Faces may be so far apart and touch for rays, in render units.
+/// Faces within this distance touch, for rays, in render units.
 const APART: f32 = 1e-5;
-/// Names of media have so many bits for a material: see `glsl/trace/media.glsl`.
+/// A medium has 16 bits for its material: see `glsl/trace/media.glsl`.
 const MOST_MATERIALS: usize = 0xffff;
 
 /// The order of the objects that are solid dielectrics.
 pub(crate) struct Nesting {
-    /// Of each object: the lowest is what is there.
+    /// The rank of each object; where several overlap, the lowest counts.
     pub ranks: Vec<u32>,
-    /// Whether any overlap, so that the ranks matter.
+    /// Whether any objects overlap, so that the ranks matter.
     pub overlaps: bool,
 }
 
@@ -35,10 +35,10 @@ struct Solid {
 }
 
 impl Nesting {
-    /// Of a scene's objects, by their bounds and volumes.
+    /// The ranks of a scene's objects, by their bounds and volumes.
     ///
     /// # Errors
-    /// A text, if solids overlap and there are more materials than names of media hold.
+    /// A text, if solids overlap and there are more materials than the bits of a medium can hold.
     pub(crate) fn of(scene: &Scene) -> Result<Self, String> {
         let objects = scene.objects.iter().enumerate();
         let mut solids: Vec<Solid> = objects
@@ -88,7 +88,7 @@ impl Solid {
                 low = low.min(corner);
                 high = high.max(corner);
             }
-            // From a point of its own: far from the scene's centre the parts would cancel.
+            // Relative to a point of the object: far from the scene's centre, the terms would cancel.
             let centre: DVec3 = *centre.get_or_insert(corners[0].as_dvec3());
             let [a, b, c] = corners.map(|corner| corner.as_dvec3() - centre);
             volume += a.dot(b.cross(c)) / 6.0;
@@ -101,7 +101,7 @@ impl Solid {
         }
     }
 
-    /// What touches may be a few roundings apart.
+    /// Touching faces may be a few roundings apart.
     fn meets(&self, other: &Self) -> bool {
         let is_low = |low: Vec3, high: Vec3| (low - APART).cmple(high).all();
         is_low(self.low, other.high) && is_low(other.low, self.high)

@@ -8,10 +8,10 @@ use crate::scene::Scene;
 
 /// Pieces of the longest axis.
 const PIECES: u32 = 32;
-/// Cubes of all objects together at the most; where there would be more, axes are split into fewer pieces.
+/// Maximum number of cubes of all objects together; if there were more, axes are split into fewer pieces.
 const MOST_CELLS: u64 = 1 << 21;
 
-/// The grid of each object, and the number of cubes in all.
+/// The grid of each object, and the total number of cubes.
 pub fn object_grids(scene: &Scene) -> (Vec<ObjectGrid>, u32) {
     let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); scene.objects.len()];
     let own = scene.own_triangles();
@@ -40,7 +40,7 @@ fn split(boxes: &[(Vec3, Vec3)], pieces: u32) -> (Vec<ObjectGrid>, u64) {
         .map(|&(low, high)| {
             let extent = high - low;
             let side = extent.max_element() / pieces as f32;
-            // An object without triangles has no photons either.
+            // An object without triangles has no photons.
             let empty = !(side > 0.0 && side.is_finite());
             let cells = if empty {
                 [1; 3]

@@ -1,14 +1,13 @@
-//! Parts of triangles that shine unevenly, each a light of its own.
-//!
-//! A triangle's barycentric coordinates u and v cut it into columns² parts of one shape, about half of them upside down. Those have
-//! the cells of a square of columns² with column + row < columns, as they lie; the others have the rest of them, where the point
-//! reflection of the square takes them: no number is left out, and a part is a whole number's quotient and remainder.
+//! Parts of triangles that emit unevenly, each a light of its own. A triangle is divided by its barycentric coordinates u and v
+//! into columns² parts of the same shape, about half of them upside down. Parts are numbered as cells of a square of columns²:
+//! upright parts have the cells with column + row < columns; upside-down parts have the others, by the point reflection of the
+//! square. So every number is a part, and its row and column are a quotient and a remainder.
 
 use glam::{DVec2, DVec3, dvec2};
 
 use crate::layout::Light;
 
-/// A part of a triangle: `glsl/lights/light.glsl` has the same.
+/// A part of a triangle, as in `glsl/lights/light.glsl`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Part {
     column: f64,
@@ -17,7 +16,7 @@ pub(crate) struct Part {
 }
 
 impl Part {
-    /// By its number among columns² parts.
+    /// The part with this number among columns² parts.
     pub fn numbered(number: u32, columns: u32) -> Self {
         Self {
             column: f64::from(number % columns),
@@ -26,7 +25,7 @@ impl Part {
         }
     }
 
-    /// The one that a place, the second and the third corner's barycentric coordinates, is in.
+    /// The part that contains a point, given by the barycentric coordinates of the second and the third corner.
     pub fn around(place: DVec2, columns: u32) -> Self {
         let n = f64::from(columns);
         let at = place * n;
@@ -41,18 +40,18 @@ impl Part {
         }
     }
 
-    /// What a triangle's light is.
+    /// The part of a triangle's light.
     pub fn of(light: &Light) -> Self {
         let [column, row, columns] = light.position.map(f64::from);
         Self { column, row, columns }
     }
 
-    /// As [`Light::position`] has it.
+    /// In the layout of [`Light::position`].
     pub fn packed(self) -> [f32; 3] {
         [self.column as f32, self.row as f32, self.columns as f32]
     }
 
-    /// Whether it is all of its triangle.
+    /// Whether it is the whole triangle.
     pub fn is_whole(self) -> bool {
         self.columns == 1.0
     }
@@ -62,7 +61,7 @@ impl Part {
         (self.row * self.columns + self.column) as u32
     }
 
-    /// The place in the triangle of a place in it.
+    /// The point of the triangle at a point of the part.
     pub fn place(self, within: DVec2) -> DVec2 {
         let at = (dvec2(self.column, self.row) + within) / self.columns;
         if self.column + self.row >= self.columns {
@@ -108,7 +107,7 @@ mod tests {
             }
             assert!((middle - 1.0 / 3.0).abs().max_element() < 1e-12, "{middle}");
         }
-        // Rounding may put a place on the triangle's edge, or past it.
+        // By rounding, a point may lie on the triangle's edge, or beyond it.
         for place in [
             dvec2(1.0, 0.0),
             dvec2(0.0, 1.0),

@@ -1,4 +1,4 @@
-//! Spheres that bound things.
+//! Bounding spheres.
 
 use glam::DVec3;
 
@@ -10,10 +10,10 @@ pub(crate) struct Sphere {
 }
 
 impl Sphere {
-    /// What spheres are larger than what they hold.
+    /// Factor by which spheres are larger than their content.
     pub const MARGIN: f64 = 1.0 + 1e-4;
 
-    /// Around points, about the middle of their bounds; `None` where there are none.
+    /// Around points, centred on their bounds; `None` without points.
     pub fn around(points: impl Iterator<Item = DVec3> + Clone) -> Option<Self> {
         let mut bounds: Option<(DVec3, DVec3)> = None;
         for point in points.clone() {
@@ -29,7 +29,7 @@ impl Sphere {
         })
     }
 
-    /// As the device has it.
+    /// In the device's layout.
     pub fn packed(&self) -> [f32; 4] {
         self.centre.as_vec3().extend(self.radius as f32).to_array()
     }
@@ -51,12 +51,12 @@ impl Sphere {
         }
     }
 
-    /// Whether all of another one lies in it.
+    /// Whether it contains another sphere.
     pub fn contains(&self, other: &Self) -> bool {
         self.centre.distance(other.centre) + Self::MARGIN * other.radius <= self.radius
     }
 
-    /// 1 − cos of the angle between the axis and the sides of the cone in which it is seen; 2 from inside.
+    /// 1 − cos of the angle between the axis and the sides of the cone that it subtends; 2 from inside.
     pub fn versine(&self, from: DVec3) -> f64 {
         let sin2 = self.radius * self.radius / self.centre.distance_squared(from);
         if sin2 < 1.0 {

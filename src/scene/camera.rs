@@ -1,4 +1,4 @@
-//! Cameras, and the one that stands in where the file has none.
+//! Cameras, and the default camera for files that have none.
 
 use std::f64::consts::PI;
 
@@ -8,46 +8,46 @@ use super::Scene;
 use crate::error::{Error, Result, Setting};
 use crate::text::{list, quote};
 
-/// Vertical angle of view of the camera that is framed on the bounds, in radians.
+/// Vertical angle of view of the default camera, which frames the bounds, in radians.
 const FRAMED_FOV: f64 = 40.0 * PI / 180.0;
 
-/// How far that camera looks down, in radians.
+/// Downward pitch of the default camera, in radians.
 const FRAMED_PITCH: f64 = 15.0 * PI / 180.0;
 
-/// Radius of a lens at the most, in render units, of which the scene has about one: far more than a blur that shows anything.
+/// Maximum radius of a lens, in render units; the scene's half axis is about one unit, so a larger blur shows nothing.
 const LARGEST_LENS: f64 = 100.0;
 
-/// Radius of a lens over its distance to what is in focus at the most: its rays would be nearly perpendicular to its axis.
+/// Maximum ratio of a lens's radius to the focus distance: beyond it, rays would be nearly perpendicular to the axis.
 const WIDEST_LENS: f64 = 100.0;
 
-/// Free space around the bounds in its picture, as a factor of its distance.
+/// Margin around the bounds in the default camera's picture, as a factor of its distance.
 const FRAMED_MARGIN: f64 = 1.05;
 
-/// Distances of what is sharp, in render units: nothing nearer is seen, and what is farther is as sharp as what is there.
+/// Range of focus distances, in render units: nothing nearer is visible, and everything farther is as sharp as at the upper end.
 const NEAREST_FOCUS: f32 = 1e-9;
 const FARTHEST_FOCUS: f32 = 1e9;
 
-/// What a camera's picture shows.
+/// A camera's projection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {
-    /// What lies within an angle.
+    /// Perspective.
     Perspective {
         /// Tangent of half the vertical angle of view.
         tan_half_fov: f32,
     },
-    /// What lies within a height.
+    /// Orthographic.
     Orthographic {
-        /// Half of it, in render units.
+        /// Half the height, in render units.
         half_height: f32,
     },
 }
 
-/// What makes things out of focus blurred.
+/// A thin lens, for depth of field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {
     /// Its radius, in render units.
     pub radius: f32,
-    /// Distance along the direction of view of what is in focus, in render units.
+    /// Focus distance along the direction of view, in render units.
     pub focus: f32,
 }
 
@@ -58,19 +58,19 @@ pub struct Camera {
     pub name: String,
     /// Centre of projection.
     pub position: Vec3,
-    /// Unit vector to the picture's right.
+    /// Unit vector to the right of the picture.
     pub right: Vec3,
-    /// Unit vector to the picture's top.
+    /// Unit vector to the top of the picture.
     pub up: Vec3,
     /// Unit vector into the picture.
     pub forward: Vec3,
-    /// What it shows.
+    /// Its projection.
     pub projection: Projection,
-    /// Width over height where the file gives it.
+    /// Width over height, if the file gives it.
     pub aspect: Option<f32>,
     /// Its lens; a pinhole has none.
     pub lens: Option<Lens>,
-    /// How far the film is moved to the right and up, in parts of its larger side.
+    /// Shift of the film to the right and up, as a fraction of its larger side.
     pub shift: Vec2,
 }
 
@@ -81,8 +81,8 @@ pub(crate) fn frame(forward: DVec3, up: DVec3) -> Option<[DVec3; 3]> {
     Some([right, right.cross(forward), forward])
 }
 
-/// A camera that looks at the centre of the bounds along −Z and slightly down, from where it sees all of them in any
-/// picture that is no higher than wide.
+/// A camera that looks at the centre of the bounds along −Z and slightly down, at a distance from which it sees all of them in
+/// any picture that is not higher than wide.
 pub(crate) fn framed_on((lower, upper): (Vec3, Vec3)) -> Camera {
     let (sin, cos) = FRAMED_PITCH.sin_cos();
     let forward = DVec3::new(0.0, -sin, -cos);
@@ -116,11 +116,11 @@ pub(crate) fn framed_on((lower, upper): (Vec3, Vec3)) -> Camera {
 }
 
 impl Scene {
-    /// A lens for a camera; radius and the distance along its direction of view of what is in focus in scene units. Without the
-    /// distance the centre of the scene's bounds is in focus.
+    /// A lens for a camera, with its radius and the focus distance along the direction of view, in scene units. Without a
+    /// distance, the centre of the scene's bounds is in focus.
     ///
     /// # Errors
-    /// [`Error::Setting`], if that lies behind the camera, or if the lens is too wide.
+    /// [`Error::Setting`], if the point of focus lies behind the camera, or if the lens is too wide.
     pub fn lens(&self, camera: &Camera, radius: f64, focus: Option<f64>) -> Result<Lens> {
         let scale = self.normalisation.scale;
         let (lower, upper) = self.bounds();
@@ -159,7 +159,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`Error::Config`], which lists the cameras, if there is no such one.
+    /// [`Error::Config`], which lists the cameras, if there is no such camera.
     pub fn camera_index(&self, name_or_index: Option<&str>) -> Result<usize> {
         let Some(wanted) = name_or_index else {
             return Ok(0);

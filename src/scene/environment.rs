@@ -1,4 +1,4 @@
-//! What shines from afar: a picture of the sphere of directions, or one radiance.
+//! Environment lighting: a picture of the sphere of directions, or one radiance.
 //!
 //! Pictures are equirectangular as in the Khronos glTF sample viewer: the upper edge is +Y, the centre +Z, and −X lies to
 //! the right of it. Between the centres of pixels radiance is interpolated.
@@ -12,23 +12,23 @@ use crate::error::{Error, Result};
 use crate::film::{Image, exr_pixels, hdr_pixels, read_exr, read_hdr};
 use crate::text::bytes;
 
-/// Pixels that a picture is reduced to: as many as one buffer of every device holds.
+/// Maximum number of pixels, to which larger pictures are reduced: one buffer of every device holds that many.
 const MAX_PIXELS: usize = 1 << 22;
 
-/// Radiance from each direction, never black all over.
+/// Radiance from each direction, not black everywhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {
     image: Image,
-    /// How far it is rotated about +Y, in turns, 0 ..= 1.
+    /// Rotation about +Y, in turns, 0 ..= 1.
     rotation: f64,
     /// Size of the picture that it was reduced from.
     reduced_from: Option<[usize; 2]>,
-    /// Values that were negative or not finite.
+    /// Number of values that were negative or not finite.
     replaced: usize,
 }
 
 impl Environment {
-    /// The same radiance from everywhere.
+    /// The same radiance from all directions.
     pub fn constant(radiance: Vec3) -> Self {
         Self {
             image: Image::new(1, 1, vec![radiance.to_array()]),
@@ -38,7 +38,7 @@ impl Environment {
         }
     }
 
-    /// Reads an OpenEXR or Radiance picture, by the name's end, that may take so many bytes of memory.
+    /// Reads an OpenEXR or Radiance picture, by the name's ending, within a limit of memory in bytes.
     ///
     /// # Errors
     /// A file that can't be read, whose name ends in neither `.exr` nor `.hdr`, that is too large, or black.
@@ -63,7 +63,7 @@ impl Environment {
         Self::new(image).map_err(|what| Error::file(path, what))
     }
 
-    /// From an equirectangular picture. Values that are negative or not finite are taken for 0 and counted.
+    /// From an equirectangular picture. Values that are negative or not finite are replaced by 0 and counted.
     ///
     /// # Errors
     /// A text, if nothing is above 0.
@@ -95,10 +95,10 @@ impl Environment {
         }
     }
 
-    /// With so many times the radiance.
+    /// With its radiance multiplied by a factor.
     ///
     /// # Errors
-    /// A text, if that is more or less than radiance can be.
+    /// A text, if the result is out of the range of radiance.
     pub fn scaled(self, strength: f64) -> std::result::Result<Self, String> {
         let scale = |value: f32| (f64::from(value) * strength) as f32;
         let pixels: Vec<[f32; 3]> = self.image.pixels().iter().map(|pixel| pixel.map(scale)).collect();
@@ -112,12 +112,12 @@ impl Environment {
         Ok(Self { image, ..self })
     }
 
-    /// Bytes that it takes.
+    /// Its size in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         size_of_val(self.image.pixels()) as u64
     }
 
-    /// What was done to the picture to have it rendered, one line each.
+    /// Changes that were made to the picture, one line each.
     pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.replaced > 0 {
@@ -142,12 +142,12 @@ impl Environment {
         &self.image
     }
 
-    /// How far it is rotated about +Y, in turns, 0 ..= 1.
+    /// Rotation about +Y, in turns, 0 ..= 1.
     pub(crate) fn rotation(&self) -> f64 {
         self.rotation
     }
 
-    /// Pixels, width and height; 1 × 1 where there is one radiance.
+    /// Width and height in pixels; 1 × 1 for one radiance.
     pub fn size(&self) -> [usize; 2] {
         [self.image.width(), self.image.height()]
     }
@@ -160,7 +160,7 @@ impl Environment {
             .sum()
     }
 
-    /// About the part of all directions that the light comes from: 1 where it comes from all alike.
+    /// Approximate share of all directions that the light comes from: 1 if it is uniform.
     pub(crate) fn spread(&self) -> f64 {
         let weights = self.weights();
         let rows = weights.chunks(self.image.width()).enumerate();
@@ -177,8 +177,8 @@ impl Environment {
         2.0 * PI / width as f64 * (edge(row) - edge(row + 1))
     }
 
-    /// Mean over each pixel of the interpolated radiance, itself the mean of RGB: of a pixel and its neighbours in a row and
-    /// a column, 1/8, 6/8 and 1/8.
+    /// Mean of the interpolated radiance (mean of RGB) over each pixel: a pixel and its neighbours in a row and a column weigh
+    /// 1/8, 6/8 and 1/8.
     pub(crate) fn weights(&self) -> Vec<f64> {
         let [width, height] = self.size();
         let pixels = self.image.pixels();
@@ -197,7 +197,7 @@ impl Environment {
     }
 }
 
-/// Bytes that reading takes for a pixel: as the file has it, and as it is kept.
+/// Bytes per pixel while reading: in the file's format, and as stored.
 const BYTES_A_PIXEL: u64 = 24;
 
 fn check_size(path: &Path, pixels: u64, memory_limit: u64) -> Result<()> {
@@ -216,7 +216,7 @@ fn check_size(path: &Path, pixels: u64, memory_limit: u64) -> Result<()> {
     })
 }
 
-/// The picture with fewer pixels, each the mean of what it stands for; values that are no radiance are 0.
+/// The picture with fewer pixels, each the mean of those that it replaces; invalid values are 0.
 fn reduce(image: &Image, [width, height]: [usize; 2]) -> Image {
     let part = |i: usize, from: usize, to: usize| i * from / to..(i + 1) * from / to;
     let mut pixels = Vec::with_capacity(width * height);

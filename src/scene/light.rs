@@ -1,4 +1,4 @@
-//! Lights: those that are points or directions (`KHR_lights_punctual`), and objects whose material emits.
+//! Lights: punctual lights (`KHR_lights_punctual`), and objects whose material emits.
 
 use std::f64::consts::PI;
 
@@ -11,7 +11,7 @@ use super::{Object, Scene};
 pub enum LightKind {
     /// In all directions.
     Point,
-    /// Around an axis, all of it up to the inner angle, then less, and nothing past the outer angle.
+    /// Around an axis: at full intensity up to the inner angle, then less, and 0 beyond the outer angle.
     Spot {
         /// Unit vector along the axis.
         direction: Vec3,
@@ -27,25 +27,25 @@ pub enum LightKind {
     },
 }
 
-/// A light that is no surface, in render space.
+/// A punctual light, in render space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PunctualLight {
     /// Point, spot or directional.
     pub kind: LightKind,
-    /// Where it is; of no meaning where its rays are parallel.
+    /// Position; without meaning if its rays are parallel.
     pub position: Vec3,
     /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB. Never black.
     pub intensity: Vec3,
-    /// How large it is: the radius of a point or spot, in render units, which is seen as a ball of it; half of the angle that a
-    /// directional one takes up, in radians. 0 where it has no extent.
+    /// Extent: the radius of a point or spot, in render units, which looks like a ball of that radius; half of the angle that a
+    /// directional light subtends, in radians. 0 for a delta light.
     pub extent: f64,
-    /// Point, spot: the distance that it reaches, in render units; `None` where it reaches any.
+    /// Point, spot: the range, in render units; `None` if it is unlimited.
     pub range: Option<f64>,
 }
 
 impl PunctualLight {
-    /// Emitted power: mean of the RGB intensity times the solid angle that would have it all over, or times the area across
-    /// the rays, here of a disc, that meets the scene.
+    /// Emitted power: mean of the RGB intensity, times the solid angle that gives the same flux at full intensity, or times the
+    /// area across the rays, here of a disc, that covers the scene.
     pub fn power(&self, disc_area: f64) -> f64 {
         let intensity = self.intensity.as_dvec3().element_sum() / 3.0;
         intensity
@@ -69,7 +69,7 @@ impl Scene {
         })
     }
 
-    /// Whether anything in it emits light.
+    /// Whether any object emits light.
     pub(crate) fn has_emissive_triangles(&self) -> bool {
         self.emitting_objects().next().is_some()
     }

@@ -1,7 +1,7 @@
-//! A scene as the renderer sees it: triangles in render space, materials, lights and cameras.
+//! Scenes: triangles in render space, materials, lights and cameras.
 //!
-//! *Render space* is world space recentred and rescaled in f64, so that the scene's bounds are centred on the origin
-//! and their longest half axis is 1. Whatever the units and the place of the scene, f32 then has the same precision.
+//! *Render space* is world space recentred and rescaled in f64, so that the scene's bounds are centred on the origin and their
+//! longest half axis is 1. So f32 has the same precision for any units and position of the scene.
 
 mod camera;
 mod environment;
@@ -41,7 +41,7 @@ impl Normalisation {
     }
 }
 
-/// One primitive of one mesh instance: the unit within which photons and visible points meet.
+/// One primitive of one mesh instance: visible points accept photons of their own object only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
     /// Name of the node or mesh.
@@ -50,12 +50,12 @@ pub struct Object {
     pub material: u32,
     /// Its triangles in [`Scene::triangles`].
     pub triangles: std::ops::Range<u32>,
-    /// Where it puts them, if it shares them with other objects.
+    /// The placement of its triangles, if it shares them with other objects.
     pub placement: Option<Placement>,
 }
 
 impl Object {
-    /// Where a corner of one of its triangles is, in render space.
+    /// Position of a corner of one of its triangles, in render space.
     pub(crate) fn placed(&self, corner: Vec3) -> Vec3 {
         self.placement.map_or(corner, |placement| placement.point(corner))
     }
@@ -64,7 +64,7 @@ impl Object {
 /// A triangle of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Triangle {
-    /// Indices into [`Scene::positions`] and what else vertices have, counter-clockwise seen from the front.
+    /// Indices into [`Scene::positions`] and the other vertex attributes, counter-clockwise seen from the front.
     pub vertices: [u32; 3],
     /// Index into [`Scene::objects`], or [`SHARED`].
     pub object: u32,
@@ -78,19 +78,18 @@ pub const SHARED: u32 = u32::MAX;
 pub struct Scene {
     /// File name without its extension.
     pub name: String,
-    /// Vertex positions in render space; those of shared triangles within −1 ..= 1 in a space of their own, as their
-    /// normals and tangents are.
+    /// Vertex positions in render space; those of shared triangles within −1 ..= 1 in a space of their own, like their normals
+    /// and tangents.
     pub positions: Vec<Vec3>,
     /// Unit shading normals, one per position.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates of the sets 0 and 1, one pair per position; none at all where no primitive has any. A set
-    /// that a primitive lacks is zero.
+    /// Texture coordinates of the sets 0 and 1, one pair per position; empty if no primitive has any. A set that a primitive
+    /// lacks is zero.
     pub texcoords: Vec<[Vec2; 2]>,
-    /// Linear RGBA factors of the base colour, one per position, white where a primitive has none; none at all where no
-    /// primitive has any.
+    /// Linear RGBA factors of the base colour, one per position, white if a primitive has none; empty if no primitive has any.
     pub colors: Vec<Vec4>,
-    /// Unit tangents, and in w the sign of the bitangent w · normal × tangent, one per position, zero where a primitive
-    /// has none; none at all where no primitive has any.
+    /// Unit tangents, and in w the sign of the bitangent w · normal × tangent, one per position, zero if a primitive has none;
+    /// empty if no primitive has any.
     pub tangents: Vec<Vec4>,
     /// Triangles, grouped by object.
     pub triangles: Vec<Triangle>,
@@ -98,25 +97,25 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Materials.
     pub materials: Vec<Material>,
-    /// Lights that are points or directions.
+    /// Punctual lights.
     pub lights: Vec<PunctualLight>,
-    /// What shines from afar.
+    /// Environment lighting.
     pub environment: Option<Environment>,
-    /// Their textures.
+    /// Textures of the materials.
     pub textures: Textures,
     /// Cameras; at least one.
     pub cameras: Vec<Camera>,
-    /// How render space lies in world space.
+    /// The map from world space to render space.
     pub normalisation: Normalisation,
     /// Triangles of zero area that were dropped.
     pub dropped_triangles: usize,
-    /// The file that it is from, and those that this one refers to.
+    /// The file that it was read from, and the files that it refers to.
     pub files: Vec<PathBuf>,
     /// Names of the file's material variants.
     pub variants: Vec<String>,
-    /// What the file asks for and the renderer doesn't do, one line each.
+    /// Features of the file that the renderer does not support, one line each.
     pub warnings: Vec<Remark>,
-    /// What was decided where a file leaves a choice, one line each.
+    /// Decisions where the file leaves a choice, one line each.
     pub notes: Vec<Remark>,
 }
 
@@ -134,14 +133,14 @@ impl Scene {
         own.chain(self.placed_triangles().flat_map(|(_, corners)| corners))
     }
 
-    /// Triangles that aren't shared.
+    /// Triangles that are not shared.
     pub(crate) fn own_triangles(&self) -> impl Iterator<Item = u32> {
         let all = (0..).zip(&self.triangles);
         all.filter(|(_, triangle)| triangle.object != SHARED)
             .map(|(index, _)| index)
     }
 
-    /// Indices of the objects that share triangles, and corners of those where they put them, in render space.
+    /// Indices of the objects that share triangles, and the corners of their placed triangles, in render space.
     pub(crate) fn placed_triangles(&self) -> impl Iterator<Item = (u32, [Vec3; 3])> {
         let placed = (0..)
             .zip(&self.objects)
@@ -152,13 +151,13 @@ impl Scene {
         })
     }
 
-    /// Corners of a triangle in the space that it is in.
+    /// Corners of a triangle in its own space.
     pub(crate) fn corners_of(&self, triangle: u32) -> [Vec3; 3] {
         let corners = self.triangles[triangle as usize].vertices;
         corners.map(|vertex| self.positions[vertex as usize])
     }
 
-    /// Area of the triangle with that index, which isn't shared, in square render units.
+    /// Area of the triangle with that index, which must not be shared, in square render units.
     pub fn triangle_area(&self, triangle: u32) -> f64 {
         area(self.corners_of(triangle))
     }

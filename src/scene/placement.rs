@@ -1,24 +1,23 @@
-//! Where an instance puts triangles that it shares with others.
+//! Placement of shared triangles by an instance.
 
 use glam::{DAffine3, DMat3, DVec3, Mat3, Vec3};
 
-/// The thinnest that an instance may be, in render units: nearer to 0, what rounds the local ray is as large as the
-/// triangles.
+/// Minimum thickness of an instance, in render units: below it, the rounding of the local ray is as large as the triangles.
 const THINNEST: f64 = 1e-5;
-/// How much longer it may be one way than another, against what its triangles are in their own space.
+/// Maximum ratio of its scales along different axes, relative to its triangles in their own space.
 const LONGEST: f64 = 1e4;
-/// Half a unit in the last place of an f32 of 1: what rounding it adds at the most.
+/// Half a unit in the last place of 1.0f32: the largest relative rounding error.
 const ROUNDING: f32 = 0.5 * f32::EPSILON;
 
 /// An affine map from the space of shared triangles, whose coordinates lie within −1 ..= 1, to render space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// A row for each coordinate of render space: its factors, and what is added.
+    /// A row for each coordinate of render space: factors, then the translation.
     pub rows: [[f32; 4]; 3],
 }
 
 impl Placement {
-    /// The map, rounded; `None` for one that flattens or stretches too much to be undone.
+    /// The map, rounded; `None` for one that flattens or stretches too much to be inverted.
     pub(crate) fn new(map: DAffine3) -> Option<Self> {
         let columns = [map.x_axis, map.y_axis, map.z_axis, map.w_axis].map(DVec3::as_vec3);
         let rows = [0, 1, 2].map(|row| columns.map(|column| column[row]));
@@ -26,7 +25,7 @@ impl Placement {
         let linear = placement.map().matrix3;
         let size = |m: DMat3| m.to_cols_array().map(|entry| entry * entry).iter().sum::<f64>().sqrt();
         let (grows, shrinks) = (size(linear), size(linear.inverse()));
-        // Not a number fails as well.
+        // NaN fails as well.
         (map.is_finite() && shrinks * THINNEST < 1.0 && grows * shrinks < LONGEST).then_some(placement)
     }
 
@@ -36,17 +35,17 @@ impl Placement {
         DAffine3::from_cols(column(0), column(1), column(2), column(3))
     }
 
-    /// Where it puts a point, with the roundings of `placed` in `glsl/trace/triangles.glsl`.
+    /// Transforms a point, with the same rounding as `placed` in `glsl/trace/triangles.glsl`.
     pub fn point(&self, p: Vec3) -> Vec3 {
         Vec3::from_array(self.rows.map(|[x, y, z, w]| x * p.x + y * p.y + z * p.z + w))
     }
 
-    /// Whether fronts become backs.
+    /// Whether it mirrors: front faces become back faces.
     pub fn is_mirrored(&self) -> bool {
         self.map().matrix3.determinant() < 0.0
     }
 
-    /// The way back, and how far from their place, in the triangles' space, rounding may put corners.
+    /// The inverse map, and a bound of the rounding error of corners, in the triangles' space.
     pub(crate) fn inverse(&self) -> ([[f32; 4]; 3], f32) {
         let inverse = self.map().inverse();
         let columns = [inverse.x_axis, inverse.y_axis, inverse.z_axis, inverse.w_axis].map(DVec3::as_vec3);
@@ -56,7 +55,7 @@ impl Placement {
         (rows, 6.0 * ROUNDING * (linear * self.reach()).max_element())
     }
 
-    /// What the terms add up to at the most that the coordinates of a point are sums of.
+    /// Upper bound of the sums of absolute terms of a point's coordinates.
     pub(crate) fn reach(&self) -> Vec3 {
         Vec3::from_array(self.rows.map(|row| row.map(f32::abs).iter().sum()))
     }

@@ -1,18 +1,19 @@
-//! What a user should know of a scene.
+//! Remarks about a scene for the user.
 
 use std::fmt;
 use std::ops::Deref;
 
 use crate::error::one_line;
 
-/// What a user should know of a scene, in one line. It names no program's flags; [`Remark::choice`] tells what to choose by.
+/// A remark about a scene for the user, in one line. It names no flags of a program; [`Remark::choice`] is the option that
+/// changes it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remark {
     text: String,
     choice: Option<LoadChoice>,
 }
 
-/// What of [`LoadOptions`](crate::loader::LoadOptions) decides otherwise.
+/// The field of [`LoadOptions`](crate::loader::LoadOptions) that changes a decision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LoadChoice {
@@ -29,7 +30,7 @@ pub enum LoadChoice {
 }
 
 impl Remark {
-    /// On what an option would change.
+    /// A remark about a decision that an option changes.
     pub(crate) fn with(choice: LoadChoice, text: impl Into<String>) -> Self {
         Self {
             text: one_line(text.into()),
@@ -42,7 +43,7 @@ impl Remark {
         &self.text
     }
 
-    /// The option that decides it.
+    /// The option that changes it.
     pub fn choice(&self) -> Option<LoadChoice> {
         self.choice
     }

@@ -1,4 +1,4 @@
-//! Textures: which places of which images a material looks its values up at.
+//! Textures: images, and how materials look up values in them.
 
 use std::sync::LazyLock;
 
@@ -9,7 +9,7 @@ use crate::layout::{CLAMP, MIRROR_REPEAT, NEAREST, SECOND_SET, SRGB, TextureLook
 /// All textures of a scene, in the layout of the device.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Textures {
-    /// How each is looked up.
+    /// The look-up of each texture.
     pub lookups: Vec<TextureLookup>,
     /// Texels of all images, RGBA bytes.
     pub texels: Vec<u32>,
@@ -23,10 +23,10 @@ impl Textures {
 }
 
 impl TextureLookup {
-    /// The value of the texture, RGBA, linear; `sets` are the coordinates of both sets. There are no mip levels: a pixel is
-    /// the mean of many places.
+    /// The value of the texture, RGBA, linear; `sets` are the coordinates of both sets. There are no mip levels: a pixel averages
+    /// many positions.
     pub fn value(&self, texels: &[u32], sets: [DVec2; 2]) -> DVec4 {
-        // Past that, floats have no texels apart; NaN fails the comparison.
+        // Beyond that, floats do not distinguish texels; NaN fails the comparison.
         let [u, v] = self
             .place(sets)
             .to_array()
@@ -41,19 +41,19 @@ impl TextureLookup {
         row(y).lerp(row(y + 1.0), v - y)
     }
 
-    /// Where it is looked up, in texels.
+    /// Position of the look-up, in texels.
     fn place(&self, sets: [DVec2; 2]) -> DVec2 {
         let set = sets[usize::from(self.flags & SECOND_SET != 0)];
         let place = |row: [f32; 3]| f64::from(row[0]) * set.x + f64::from(row[1]) * set.y + f64::from(row[2]);
         DVec2::new(place(self.row_u), place(self.row_v)) * self.size().as_dvec2()
     }
 
-    /// Of its image, in texels.
+    /// Size of its image, in texels.
     fn size(&self) -> UVec2 {
         UVec2::new(self.size & 0xffff, self.size >> 16)
     }
 
-    /// Linear RGBA; where the image doesn't reach, what its wraps say.
+    /// Linear RGBA; outside of the image by its wrap modes.
     fn texel(&self, texels: &[u32], [x, y]: [i64; 2]) -> DVec4 {
         let size = self.size();
         let column = wrap(x, size.x, self.flags >> WRAP_U);
@@ -64,7 +64,7 @@ impl TextureLookup {
         )
     }
 
-    /// Texels along the longest way across a triangle.
+    /// Number of texels along the longest side of a triangle.
     pub(crate) fn texels_across(&self, corners: [[DVec2; 2]; 3]) -> f64 {
         let [a, b, c] = corners.map(|sets| self.place(sets));
         [b - a, c - b, a - c]
@@ -73,13 +73,13 @@ impl TextureLookup {
             .fold(0.0, f64::max)
     }
 
-    /// The largest value that a function of texels has among those that places of a triangle read, or 1 where they are many: at no
-    /// place the texture's is above that.
+    /// The maximum of a function of texels over those that points of a triangle read, or 1 if there are many: an upper bound of
+    /// its value at any point.
     pub(crate) fn most(&self, texels: &[u32], corners: [[DVec2; 2]; 3], value: impl Fn(DVec4) -> f64) -> f64 {
         const MOST_READ: f64 = 1024.0;
         let [a, b, c] = corners.map(|sets| self.place(sets));
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        // Where a device has rounded them to.
+        // As rounded by a device.
         let off = 0.01 + 1e-6 * low.abs().max(high.abs());
         let beside = if self.flags & NEAREST != 0 { 0.0 } else { 0.5 };
         let (first, last) = ((low - off - beside).floor(), (high + off + beside).floor());
@@ -94,7 +94,7 @@ impl TextureLookup {
     }
 }
 
-/// The texel of an image of so many along one side that stands at a place.
+/// The texel at a position along one side of an image.
 fn wrap(place: i64, count: u32, mode: u32) -> u32 {
     let count = i64::from(count);
     (match mode & 3 {
@@ -114,7 +114,7 @@ fn decode(texel: u32, srgb: bool) -> DVec4 {
     dvec4(linear(r), linear(g), linear(b), plain[usize::from(a)])
 }
 
-/// What a byte means as it is, and as sRGB: IEC 61966-2-1.
+/// The value of a byte as linear and as sRGB: IEC 61966-2-1.
 static LINEAR: LazyLock<[[f64; 256]; 2]> = LazyLock::new(|| {
     let plain = std::array::from_fn(|byte| byte as f64 / 255.0);
     let decoded = |value: f64| match value {
