@@ -1,4 +1,4 @@
-//! Cells and their probabilities, learned from what paths were worth.
+//! Learns cells and their probabilities from the values of paths.
 
 use bytemuck::Zeroable;
 use rayon::prelude::*;
@@ -17,55 +17,54 @@ use crate::sizes::MOST_EMISSION_CELLS;
 
 /// Rounds of learning before the first iteration, each of a quarter of its paths.
 const PILOT_ROUNDS: u32 = 4;
-/// Paths of one of the first iterations that are learned from at the most, and of a later one: where photons are wanted is found
-/// early, and seldom ones of much flux need many paths to be found.
+/// Maximum number of paths that are learned from, in one of the first iterations and in a later one: the distribution of demand
+/// is found early, and rare paths with much flux need many paths to be found.
 const COUNTED_PATHS: [u32; 2] = [1 << 16, 1 << 14];
 /// The first of the later iterations.
 const LATER: u32 = 16;
-/// How many times better aimed paths have to be than those by power: they cost more than their rays.
+/// Minimum factor by which aimed paths have to be better than paths by power: they cost more than their rays.
 const WORTH_IT: f64 = 2.5;
-/// Rays that a path may take on average, where paths by power take fewer. Those that are aimed at glass take many: some of
-/// them aren't traced, and the others carry their flux.
+/// Maximum average number of rays per path, if paths by power take fewer. Paths that are aimed at glass take many: some of them
+/// are not traced, and the others carry their flux.
 const FEWEST_RAYS: f64 = 4.0;
-/// Rays and starts that a cell is taken to have had already, as good as all others'.
+/// Rays and starts that each cell is assumed to have had before, with the average value.
 const PRIOR: f64 = 16.0;
-/// A path counts for no more than so many times the median of those that are worth something: rare ones of much flux would
-/// drown what the others tell.
+/// Clamp of a path's value, as a multiple of the median of the positive values: rare paths with much flux would mask the others.
 const MOST_VALUE: f64 = 1000.0;
-/// How many times larger or smaller an update makes a cell's probability at the most, where it had many paths.
+/// Maximum factor by which an update changes the probability of a cell with many paths.
 const LARGEST_CHANGE: f64 = 16.0;
-/// Paths with which a cell's change may be half of that.
+/// Number of paths with which a cell may change by half of that.
 const TRUSTED: f64 = 32.0;
-/// Parts of a cell along each coordinate that are told apart.
+/// Number of bins of a cell along each coordinate.
 const BINS: usize = 8;
-/// Paths that a cell is cut in two with at the least.
+/// Minimum number of paths in a cell that is split.
 const CUT_PATHS: f64 = 64.0;
-/// The part of the variance that has to be saved at the least, if each part of the cell had a density of its own.
+/// Minimum share of the variance that a separate density for each bin would save, for a cell to be split.
 const CUT_CONTRAST: f64 = 0.04;
-/// How large χ² of the parts' values has to be: with one degree of freedom less than parts, 1 in 1000 by chance.
+/// Minimum χ² of the bins' values, with one degree of freedom less than bins: exceeded by chance in 1 of 1000 cases.
 const SIGNIFICANT: f64 = 24.0;
-/// Cuts that an update makes through a cell, one after the other.
+/// Maximum number of successive splits of a cell in an update.
 const CUT_ROUNDS: usize = 8;
-/// The thinnest that a cell may be: random numbers have steps of 2⁻²⁴.
+/// Minimum width of a cell: random numbers have steps of 2⁻²⁴.
 const THINNEST: f32 = 1.0 / 65536.0;
 
-/// The iteration whose random numbers a pilot round draws. No render gets that far, and the radius has its own.
+/// The iteration whose random numbers a pilot round uses. No render gets that far, and the search for radii uses others.
 fn pilot_iteration(round: u32) -> u32 {
     radius::PILOT - 1 - round
 }
 
-/// Whether paths of an iteration are learned from: later ones have so many before them that few of a block are enough.
+/// Whether paths of an iteration are learned from: in later blocks, few iterations are sufficient.
 pub fn is_learned_from(config: &RenderConfig, iteration: u32) -> bool {
     iteration < 64 || iteration - config.block_of(iteration) < 4
 }
 
-/// Paths of an iteration that are learned from at the most.
+/// Maximum number of paths of an iteration that are learned from.
 pub fn counted_paths(iteration: u32) -> u32 {
     let later = (LATER..pilot_iteration(PILOT_ROUNDS)).contains(&iteration);
     COUNTED_PATHS[usize::from(later)]
 }
 
-/// What is known of a cell's paths: sums in path order, so that they have the same bits in every run.
+/// Statistics of a cell's paths: sums in path order, so that they have the same bits in every run.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Counts {
     paths: f64,
@@ -73,19 +72,19 @@ struct Counts {
     rays: f64,
     /// Σ value².
     squares: f64,
-    /// Along each coordinate, paths in equal parts of the cell.
+    /// Along each coordinate, the number of paths in equal bins of the cell.
     paths_in: [[f64; BINS]; DIMENSIONS],
-    /// Their value.
+    /// Sums of their values.
     value_in: [[f64; BINS]; DIMENSIONS],
 }
 
 impl Counts {
-    /// What its paths cost: one for each start, and one for each ray.
+    /// Cost of its paths: one for each start, and one for each ray.
     fn cost(&self) -> f64 {
         self.paths + self.rays
     }
 
-    /// These parts of the paths and of the value, about which no more is known.
+    /// Statistics with these shares of the paths and of the value, without distribution over bins.
     fn part(&self, paths: f64, value: f64) -> Self {
         Self {
             paths: self.paths * paths,
@@ -97,7 +96,7 @@ impl Counts {
         }
     }
 
-    /// What the same paths would be worth if each were worth so many times as much.
+    /// Statistics of the same paths with scaled values.
     fn revalued(&self, factor: f64) -> Self {
         Self {
             value: self.value * factor,
@@ -112,7 +111,7 @@ fn scaled(sums: [[f64; BINS]; DIMENSIONS], factor: f64) -> [[f64; BINS]; DIMENSI
     sums.map(|along| along.map(|sum| sum * factor))
 }
 
-/// What is known of the parts of half a cell, if each of its own was known as one.
+/// The bins of half a cell, from the bins of the whole cell.
 fn of_half(sums: [f64; BINS], upper: bool) -> [f64; BINS] {
     let first = if upper { BINS / 2 } else { 0 };
     std::array::from_fn(|part| 0.5 * sums[first + part / 2])
@@ -125,7 +124,7 @@ struct Cell {
     low: [f32; DIMENSIONS],
     size: [f32; DIMENSIONS],
     probability: f64,
-    /// By which its paths start.
+    /// Probability that a path starts in it.
     density: f64,
     counts: Counts,
 }
@@ -136,11 +135,11 @@ impl Cell {
     }
 }
 
-/// Where to cut a cell in two.
+/// The split of a cell.
 #[derive(Debug, Clone, Copy)]
 struct Cut {
     dimension: usize,
-    /// Part of the cell's probability that the lower half should have.
+    /// Share of the cell's probability for the lower half.
     lower: f64,
     contrast: f64,
 }
@@ -164,7 +163,7 @@ impl Worth {
     }
 }
 
-/// What a path that is counted tells.
+/// The data of a counted path.
 struct Counted {
     cell: usize,
     bins: [usize; DIMENSIONS],
@@ -172,29 +171,29 @@ struct Counted {
     rays: f64,
 }
 
-/// Where photon paths start, and what is known about that.
+/// The emission table and the statistics from which it is learned.
 #[derive(Debug, Clone)]
 pub struct Aim {
     strata: Vec<Stratum>,
     cells: Vec<Cell>,
     table: Table,
-    /// Since the last update.
+    /// Paths since the last update.
     has_learned: bool,
 }
 
 impl Aim {
-    /// Before any path. `points`: the visible points of the first iteration.
+    /// The initial state. `points`: the visible points of the first iteration.
     pub fn new(scene: &PackedScene, points: &[VisiblePoint]) -> Self {
         let targets = targets(scene, points);
         let spheres = targets.spheres.iter().map(|target| target.sphere.packed());
         Self::of_strata(strata(scene, &targets), spheres.collect(), targets.view)
     }
 
-    /// Aims paths by pilot rounds; `trace` follows an iteration's paths that start by a table, and returns what those were worth.
-    /// `None` where aiming isn't worth its cost.
+    /// Aims paths by pilot rounds; `trace` traces an iteration's paths that start by a table, and returns their values. `None` if
+    /// aiming does not pay for its cost.
     ///
     /// # Errors
-    /// Those of `trace`.
+    /// The errors of `trace`.
     pub fn by_pilots<E>(
         config: &RenderConfig,
         scene: &PackedScene,
@@ -203,7 +202,7 @@ impl Aim {
     ) -> Result<Option<Self>, E> {
         let mut aim = Self::new(scene, points);
         for round in 0..PILOT_ROUNDS {
-            // Does nothing before anything is known.
+            // Without statistics, nothing changes.
             aim.update();
             let iteration = pilot_iteration(round);
             let values = trace(aim.table(), iteration)?;
@@ -239,13 +238,13 @@ impl Aim {
         aim
     }
 
-    /// What the next paths start by.
+    /// The table for the next paths.
     pub fn table(&self) -> &Table {
         &self.table
     }
 
-    /// Counts paths that started by the table as it is: those of an iteration from `first_path` on, with what each was worth,
-    /// [`PathValue::packed`]. Looks at [`counted_paths`] of them.
+    /// Adds paths that started by the current table: those of an iteration from `first_path` on, with their values,
+    /// [`PathValue::packed`]. Uses [`counted_paths`] of them.
     pub fn learn(&mut self, config: &RenderConfig, iteration: u32, first_path: u32, values: &[u32]) {
         let table = &self.table;
         let count = |(number, &word): (usize, &u32)| {
@@ -274,12 +273,12 @@ impl Aim {
         } else {
             MOST_VALUE * *useful.select_nth_unstable_by(middle, f64::total_cmp).1
         };
-        // In units of their mean, so that what was learned beside a darker picture weighs as much.
+        // In units of their mean, so that values relative to an earlier, darker picture have the same weight.
         let sum: f64 = useful.iter().map(|value| value.min(most)).sum();
         let unit = if sum > 0.0 { sum / counted.len() as f64 } else { 1.0 };
         for path in counted {
             let value = path.value.min(most) / unit;
-            // The last cell stands for paths that aren't traced.
+            // The last cell represents paths that are not traced.
             let Some(cell) = self.cells.get_mut(path.cell) else {
                 continue;
             };
@@ -295,9 +294,8 @@ impl Aim {
         }
     }
 
-    /// Makes the table that what was learned asks for: a path's value is taken to be its contribution's square. The
-    /// probability that makes the mean's variance least for the same cost is in proportion to the square root of the
-    /// squared contribution's density over the cost.
+    /// Updates the table: a path's value is the square of its contribution. For a given cost, the variance of the mean is minimal
+    /// if the probability is proportional to the square root of the density of the squared contribution over the cost.
     pub fn update(&mut self) {
         let value: f64 = self.cells.iter().map(|cell| cell.counts.value).sum();
         let cost: f64 = self.cells.iter().map(|cell| cell.counts.cost()).sum();
@@ -316,7 +314,7 @@ impl Aim {
         }
         self.normalise();
         for cell in &mut self.cells {
-            // What is known already counts half, and as paths that had started by the new density.
+            // Previous statistics are halved, and treated as if the paths had started by the new density.
             let density = cell.probability / cell.volume();
             let factor = (cell.density / density).powi(2);
             cell.counts = cell.counts.part(0.5, 0.5).revalued(factor);
@@ -324,7 +322,7 @@ impl Aim {
         }
     }
 
-    /// Cuts cells in two whose halves differ, those first that matter most.
+    /// Splits cells whose halves differ, the most important ones first.
     fn cut(&mut self) {
         let cells = self.cells.iter().enumerate();
         let mut cuts: Vec<(usize, Cut)> = cells
@@ -365,7 +363,7 @@ impl Aim {
         let one_light = self.strata[cell.stratum].lights.len() == 1;
         let usable = if one_light { DIMENSIONS - 1 } else { DIMENSIONS };
         let value = counts.value;
-        // As many equal values would vary as these do.
+        // The number of equal values with the same relative variance.
         let effective = value * value / counts.squares;
         let prior = PRIOR / BINS as f64;
         let rate = |value: f64, paths: f64| (value + prior * counts.value / counts.paths) / (paths + prior);
@@ -374,7 +372,7 @@ impl Aim {
             let (paths, values) = (&counts.paths_in[dimension], &counts.value_in[dimension]);
             let rates: [f64; BINS] = std::array::from_fn(|bin| rate(values[bin], paths[bin]));
             let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-            // As the density is to be in proportion to the root.
+            // Because the density is proportional to the root.
             let contrast = 1.0 - mean(&rates.map(f64::sqrt)).powi(2) / mean(&rates);
             let squares: f64 = values.iter().map(|part| (part / value).powi(2)).sum();
             let chi2 = effective * (BINS as f64 * squares - 1.0);
@@ -390,7 +388,7 @@ impl Aim {
         cuts.max_by(|a, b| a.contrast.total_cmp(&b.contrast))
     }
 
-    /// Makes the probabilities' sum 1 and each no less than its floor, and the table of them.
+    /// Normalises the probabilities, each at least its floor, and builds the table.
     fn normalise(&mut self) {
         let strata = &self.strata;
         let floor = |cell: &Cell| strata[cell.stratum].floor * cell.volume();
@@ -432,8 +430,8 @@ impl Aim {
         });
     }
 
-    /// Whether aimed paths are worth their cost: how much less the picture's squared error has for the same rays than with paths
-    /// by power, in the same time. In a closed room nearly every photon is of use wherever it starts.
+    /// Whether aiming pays for its cost: compares the squared error of the picture for the same time with that of paths by power.
+    /// In a closed room nearly every photon is useful, wherever it starts.
     pub fn is_worth_it(&self) -> bool {
         let (mut aimed, mut by_power) = (Worth::default(), Worth::default());
         for cell in self.cells.iter().filter(|cell| cell.counts.paths > 0.0) {
@@ -441,13 +439,13 @@ impl Aim {
             let [value, rays] = [counts.value, counts.rays].map(|sum| sum / counts.paths);
             let share = self.strata[cell.stratum].share * cell.volume();
             aimed.add(cell.probability, value, rays);
-            // The same paths' flux is larger where they start less often.
+            // The flux of a path is inversely proportional to its density.
             by_power.add(share, value * (cell.probability / share).powi(2), rays);
         }
         aimed.value == 0.0 || by_power.product() > WORTH_IT * aimed.product()
     }
 
-    /// The part of the paths that is traced, so that all together take about as many rays as by power.
+    /// The share of the paths that is traced, so that they take about as many rays as paths by power.
     fn traced(&self) -> f64 {
         let rays = |cell: &Cell| {
             let counts = &cell.counts;

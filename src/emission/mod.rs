@@ -1,10 +1,10 @@
-//! Where photon paths start, learned from what earlier ones were worth.
+//! Emission: sampling tables of photon paths, learned from the values of earlier paths.
 //!
-//! A path belongs to the first of the *targets* (spheres, smaller ones first) that it meets from its light on, or
-//! to none. The paths of a source that belong to one target are a *stratum*, and what chooses a path rejects it
-//! where it belongs to another one: so each path can be chosen in one way alone, and its flux needs no other's density. A
-//! stratum's starts have five coordinates; boxes of them, *cells*, have a probability each ([`Aim`]), which is never so small
-//! that a photon carries many times what it would have carried by power.
+//! A path belongs to the first *target* (spheres in order, smaller ones first) that its first segment hits, or to none. The paths
+//! of a source that belong to one target are a *stratum*. A path that was sampled for another stratum is rejected, so each path
+//! can be sampled in one way only, and its flux needs no other density. The starts of a stratum have five coordinates; boxes of
+//! them, *cells*, have a probability each ([`Aim`]), with a lower bound, so that no photon carries many times the flux of a
+//! photon by power.
 
 mod learning;
 mod path_value;

@@ -1,22 +1,22 @@
-//! What photon paths report.
+//! Values that photon paths report.
 
-/// What a path was worth, for where later ones are aimed.
+/// The value and the cost of a path, from which the emission table is learned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathValue {
-    /// The square of what it brought that the picture needs, in any unit; 0 or more.
+    /// The squared error of the picture that its photons remove, in any unit; 0 or more.
     pub value: f32,
-    /// Rays that it traced.
+    /// Number of rays that it traced.
     pub rays: u32,
 }
 
 impl PathValue {
-    /// As the device stores it: in the upper 24 bits the value without its sign and the last 7 bits, and the rays up to 255.
-    /// Squares span many orders of magnitude.
+    /// In the device's layout: the upper 24 bits hold the value without its sign and the last 7 bits, the lower 8 bits the rays,
+    /// up to 255. Squares span many orders of magnitude.
     pub fn packed(self) -> u32 {
         (self.value.to_bits() << 1 & 0xffff_ff00) | self.rays.min(255)
     }
 
-    /// What a device has stored.
+    /// From the device's layout.
     pub fn unpacked(word: u32) -> Self {
         Self {
             value: f32::from_bits(word >> 1 & 0x7fff_ff80),

@@ -1,4 +1,4 @@
-//! The strata of photon paths: those of a source that meet one target before any other, or none.
+//! The strata of photon paths: paths of a source that hit one target before any other, or none.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -11,27 +11,27 @@ use crate::packing::PackedScene;
 use crate::packing::Part;
 use crate::packing::Sphere;
 
-/// Of a stratum's share of the power, what its probability is at least: no photon carries much more than by power.
+/// Minimum probability of a stratum, relative to its share of the power: no photon carries much more flux than by power.
 const FLOOR: f64 = 0.2;
-/// What the floors may be together, without the part that is alike.
+/// Maximum sum of the lower bounds, without the equal share.
 const MOST_FLOOR: f64 = 0.4;
-/// The part of all paths that goes to all strata alike.
+/// The share of paths that is equal for all strata.
 const EXPLORED: f64 = 0.2;
-/// Lights of a source that are asked for the share of its paths that meet a target.
+/// Number of lights of a source from which the share of its paths that hit a target is estimated.
 const PROBES: usize = 64;
 
-/// Paths of a source that meet a target first.
+/// Paths of a source that hit a target first.
 #[derive(Debug, Clone)]
 pub(super) struct Stratum {
-    /// Of [`PackedScene::lights`].
+    /// Range in [`PackedScene::lights`].
     pub lights: Range<u32>,
-    /// Index of the target, or the number of targets for paths that meet none.
+    /// Index of the target, or the number of targets for paths that hit none.
     pub target: u32,
-    /// About the part of all paths by power that its starts stand for, those that are rejected with them.
+    /// Approximate share of its starts among paths by power, including rejected ones.
     pub share: f64,
-    /// Its probability at the least.
+    /// Its minimum probability.
     pub floor: f64,
-    /// Before anything is known.
+    /// Its initial probability.
     pub initial: f64,
 }
 
@@ -72,12 +72,12 @@ fn lights_of<'a>(scene: &'a PackedScene, source: &Range<u32>) -> &'a [Light] {
     &scene.lights[source.start as usize..source.end as usize]
 }
 
-/// Without parts of triangles that are surely dark.
+/// Excluding parts of triangles that are surely dark.
 fn shining<'a>(scene: &'a PackedScene, source: &Range<u32>) -> impl Iterator<Item = &'a Light> {
     lights_of(scene, source).iter().filter(|light| light.probability > 0.0)
 }
 
-/// A source's first probability: half of it for specular targets, if there are any and others too.
+/// A source's initial probability: half of it for specular targets, if there are both specular and other targets.
 fn share_out(strata: &mut [Stratum], targets: &Targets, probability: f64) {
     let is_specular = |stratum: &Stratum| {
         let target = targets.spheres.get(stratum.target as usize);
@@ -92,12 +92,12 @@ fn share_out(strata: &mut [Stratum], targets: &Targets, probability: f64) {
     }
 }
 
-/// Whether a light's rays are from afar.
+/// Whether a light is distant.
 fn is_distant(light: &Light) -> bool {
     [DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT].contains(&light.kind)
 }
 
-/// How far from a light's point its paths may start.
+/// Maximum distance of starts from a light's point.
 pub(super) fn extent_of(light: &Light) -> f64 {
     if [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) {
         light.extent.into()
@@ -106,7 +106,7 @@ pub(super) fn extent_of(light: &Light) -> f64 {
     }
 }
 
-/// Points of a light, which has some place.
+/// Points of a light that has a position.
 fn points_of(scene: &PackedScene, light: &Light) -> [DVec3; 3] {
     if [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) {
         return [Vec3::from_array(light.position).as_dvec3(); 3];
@@ -114,7 +114,7 @@ fn points_of(scene: &PackedScene, light: &Light) -> [DVec3; 3] {
     Part::of(light).corners(corners_of(&scene.shading_triangles[light.triangle as usize]))
 }
 
-/// Whether no path of a source that meets anything passes by a sphere.
+/// Whether every path of a source that hits the scene hits the sphere.
 fn is_met_by_all(scene: &PackedScene, source: &Range<u32>, targets: &Targets, sphere: &Sphere) -> bool {
     if sphere.contains(&targets.scene) || *sphere == targets.scene {
         return true;
@@ -122,7 +122,7 @@ fn is_met_by_all(scene: &PackedScene, source: &Range<u32>, targets: &Targets, sp
     let inside = |light: &Light, point: DVec3| {
         let point = Sphere {
             centre: point,
-            // Paths leave surfaces by a little.
+            // Ray origins are offset from surfaces.
             radius: extent_of(light) + 1e-4 * sphere.radius,
         };
         sphere.contains(&point)
@@ -132,7 +132,7 @@ fn is_met_by_all(scene: &PackedScene, source: &Range<u32>, targets: &Targets, sp
     lights.all(|light| !is_distant(light) && all_inside(light))
 }
 
-/// About the share of a source's paths, by its own density, that a density uniform among those towards a sphere has.
+/// Approximate share of a source's paths by power that the uniform density of paths towards a sphere covers.
 fn share(scene: &PackedScene, source: &Range<u32>, sphere: &Sphere) -> f64 {
     let lights: Vec<&Light> = shining(scene, source).collect();
     let probes = lights.iter().step_by(lights.len().div_ceil(PROBES));

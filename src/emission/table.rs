@@ -8,31 +8,31 @@ use crate::layout::{EmissionCell, Light};
 /// Coordinates of a start.
 pub const DIMENSIONS: usize = 5;
 
-/// In [0, 1), as random numbers are: steps of 2⁻²⁴.
+/// In [0, 1), in steps of 2⁻²⁴ like random numbers.
 const STEPS: f64 = 16_777_216.0;
 
-/// Where photon paths start.
+/// The sampling table of photon paths.
 #[derive(Debug, Clone, Default)]
 pub struct Table {
-    /// What they are aimed at, smaller ones first: centre, radius; render units.
+    /// Targets, smaller ones first: centre, radius; render units.
     pub spheres: Vec<[f32; 4]>,
-    /// Index of the one around most of what the camera sees.
+    /// Index of the target around most of the view.
     pub view: Option<u32>,
     /// Boxes of starts.
     pub cells: Vec<EmissionCell>,
 }
 
-/// A cell that was chosen, and a place in it.
+/// A sampled cell, and a point in it.
 #[derive(Debug, Clone, Copy)]
 pub struct Chosen {
     /// Index of the cell.
     pub cell: usize,
-    /// In [0, 1): how far into the cell, along each coordinate.
+    /// In [0, 1): position within the cell, along each coordinate.
     pub within: [f64; DIMENSIONS],
 }
 
 impl Table {
-    /// Chooses a cell and a place in it by the first eight numbers of a path.
+    /// Samples a cell and a point in it by the first eight numbers of a path.
     pub fn choose(&self, u: [f64; 4], w: [f64; 4]) -> Chosen {
         let chosen = alias::choose(self.cells.len(), u[0], [w[0], w[2]], |cell| AliasCell {
             accept: self.cells[cell].accept,
@@ -44,7 +44,7 @@ impl Table {
         }
     }
 
-    /// The coordinates of a place in a cell.
+    /// The coordinates of a point in a cell.
     pub fn coordinates(&self, chosen: Chosen) -> [f64; DIMENSIONS] {
         let cell = &self.cells[chosen.cell];
         std::array::from_fn(|i| {
@@ -57,7 +57,8 @@ impl Table {
         })
     }
 
-    /// As the device has it: number of cells and of spheres, index of the view's; the spheres, the cells; texels of four words.
+    /// In the device's layout: the numbers of cells and spheres, the index of the view's sphere; the spheres; the cells. Texels
+    /// of four words.
     pub fn texels(&self) -> Vec<[u32; 4]> {
         let targets = self.spheres.len() as u32;
         let head = [self.cells.len() as u32, targets, self.view.unwrap_or(targets), 0];
@@ -68,7 +69,7 @@ impl Table {
     }
 }
 
-/// Of a source's lights the one that a number in [0, 1) chooses; its index, and its probability within the source.
+/// Samples a light of a source by a number in [0, 1); its index, and its probability within the source.
 pub fn light_of(lights: &[Light], source: Range<u32>, number: f64) -> (usize, f64) {
     let first = source.start as usize;
     let of_source = &lights[first..source.end as usize];

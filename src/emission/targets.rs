@@ -1,4 +1,4 @@
-//! What photon paths are aimed at: specular objects, and what the camera sees.
+//! Targets of photon paths: specular objects, and the region that the camera sees.
 
 use std::collections::BTreeMap;
 
@@ -14,34 +14,34 @@ use crate::packing::Sphere;
 use crate::scene::Placement;
 use crate::sizes::MOST_TARGETS;
 
-/// Spheres around specular objects at the most.
+/// Maximum number of spheres around specular objects.
 const MOST_SPECULAR: usize = 12;
-/// Spheres around what the camera sees at the most, each twice as large as the one before.
+/// Maximum number of spheres around the view, each twice as large as the previous one.
 const MOST_NESTED: i32 = 14;
-/// Objects that are put together by comparing each with each.
+/// Maximum number of objects that are merged by comparing all pairs.
 const MOST_COMPARED: usize = 256;
-/// Part of the scene's radius beyond which aiming at an object is of no use.
+/// Fraction of the scene's radius beyond which aiming at an object is useless.
 const LARGE: f64 = 0.5;
 
 /// A sphere that paths are aimed at.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Target {
     pub sphere: Sphere,
-    /// Whether it is around specular objects.
+    /// Whether it contains specular objects.
     pub specular: bool,
 }
 
-/// Spheres that paths are aimed at, smaller ones first.
+/// The targets, smaller ones first.
 #[derive(Debug, Clone)]
 pub(super) struct Targets {
     pub spheres: Vec<Target>,
-    /// Index of the one around most of what the camera sees.
+    /// Index of the target around most of the view.
     pub view: Option<u32>,
-    /// Around the scene.
+    /// The sphere around the scene.
     pub scene: Sphere,
 }
 
-/// Finds the targets of a scene, some of whose points are seen.
+/// Finds the targets of a scene, given some visible points.
 pub(super) fn targets(scene: &PackedScene, points: &[VisiblePoint]) -> Targets {
     let own = own_triangles(scene).flat_map(corners_of);
     let placed = scene.instances.iter().flat_map(|instance| {
@@ -65,12 +65,12 @@ pub(super) fn targets(scene: &PackedScene, points: &[VisiblePoint]) -> Targets {
         [POINT_LIGHT, SPOT_LIGHT].contains(&light.kind) && position.length() + extent_of(light) > whole.radius
     };
     if scene.lights.iter().any(is_outside) {
-        // Most of what such a light emits meets nothing.
+        // Most of the emission of such a light hits nothing.
         spheres.push(target(false)(whole));
     }
     spheres.sort_by(|a, b| a.sphere.radius.total_cmp(&b.sphere.radius));
     debug_assert!(spheres.len() <= MOST_TARGETS as usize);
-    // The innermost of the nested ones has a quarter of it.
+    // The innermost of the nested spheres has a quarter of the radius.
     let mut nested = (0..).zip(&spheres).filter(|(_, target)| !target.specular);
     let view = nested.nth(1).map(|(index, _)| index);
     Targets {
@@ -92,7 +92,7 @@ pub(super) fn corners_of(triangle: &ShadingTriangle) -> [DVec3; 3] {
     [triangle.p0, triangle.p1, triangle.p2].map(|[x, y, z, _]| Vec3::new(x, y, z).as_dvec3())
 }
 
-/// Whether a camera path would follow what it reflects or refracts.
+/// Whether camera paths follow its reflection or refraction.
 fn is_specular(material: &Material) -> bool {
     let is_narrow = |roughness: f32| f64::from(roughness).powi(2) < FOLLOWED_ALPHA;
     [MIRROR, DIELECTRIC].contains(&material.surface)
@@ -100,7 +100,7 @@ fn is_specular(material: &Material) -> bool {
         || (material.coat > 0.0 && is_narrow(material.coat_roughness))
 }
 
-/// Around each object's specular triangles.
+/// Spheres around each object's specular triangles.
 fn specular_objects(scene: &PackedScene) -> Vec<Sphere> {
     let is_specular = |triangle: &&ShadingTriangle| is_specular(&scene.materials[triangle.material as usize]);
     let mut of_objects: BTreeMap<u32, Vec<&ShadingTriangle>> = BTreeMap::new();
@@ -127,9 +127,9 @@ fn specular_objects(scene: &PackedScene) -> Vec<Sphere> {
     spheres
 }
 
-/// Puts those together whose joint sphere is the least larger than both of them.
+/// Merges the pairs whose common sphere grows least.
 fn clustered(mut spheres: Vec<Sphere>) -> Vec<Sphere> {
-    // Too many to compare: first those that lie next to each other along an axis.
+    // Too many to compare: first merges neighbours along an axis.
     for axis in (0..3).cycle() {
         if spheres.len() <= MOST_COMPARED {
             break;
@@ -152,14 +152,14 @@ fn clustered(mut spheres: Vec<Sphere>) -> Vec<Sphere> {
         let removed = spheres.swap_remove(k);
         spheres[i] = spheres[i].joint(&removed);
     }
-    // Paths that graze the sphere meet what it holds.
+    // Paths that graze the sphere hit its content.
     for sphere in &mut spheres {
         sphere.radius *= Sphere::MARGIN;
     }
     spheres
 }
 
-/// Around the middle of what the camera sees, until one would hold the whole scene.
+/// Spheres around the centre of the view, until one would contain the whole scene.
 fn nested(points: &[VisiblePoint], whole: &Sphere) -> Vec<Sphere> {
     let seen = points
         .iter()

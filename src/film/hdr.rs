@@ -6,9 +6,9 @@ use crate::files;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-/// As for OpenEXR: pictures with more pixels are taken for damaged files.
+/// As for OpenEXR: pictures with more pixels are treated as damaged files.
 const MAX_PIXELS: u64 = 1 << 27;
-/// Bytes of a header at the most.
+/// Maximum size of a header, in bytes.
 const MAX_HEADER: u64 = 1 << 20;
 
 /// Reads a Radiance file (.hdr).
@@ -36,10 +36,10 @@ pub fn read_hdr(path: &Path) -> Result<Image> {
     Ok(Image::new(width, height, pixels))
 }
 
-/// Pixels of such a file, by its first bytes.
+/// Number of pixels of a Radiance file, by its header.
 ///
 /// # Errors
-/// A file that can't be opened or isn't such a one.
+/// A file that can't be opened or is not a Radiance file.
 pub fn hdr_pixels(path: &Path) -> Result<u64> {
     let mut reader = BufReader::new(files::open(path)?);
     let [width, height] = size(&mut reader).map_err(|error| unreadable(path, &error))?;
@@ -92,7 +92,7 @@ fn size(reader: &mut impl BufRead) -> io::Result<[u32; 2]> {
     }
 }
 
-/// Reads a row: four bytes a pixel, or run lengths of each channel, or of whole pixels as files of old have it.
+/// Reads a row: four bytes per pixel, or run lengths of each channel, or of whole pixels in old files.
 fn read_row(reader: &mut impl Read, row: &mut [[u8; 4]]) -> io::Result<()> {
     let first = read_bytes(reader)?;
     let [2, 2, high, _] = first else {
@@ -127,7 +127,8 @@ fn read_row(reader: &mut impl Read, row: &mut [[u8; 4]]) -> io::Result<()> {
     Ok(())
 }
 
-/// Pixels from the second one on, where 1, 1, 1 and a number repeat the one before so often; several in a row are digits.
+/// Pixels from the second one on. 1, 1, 1 and a number repeat the previous pixel that often; consecutive ones are digits of a
+/// larger number.
 fn read_pixels(reader: &mut impl Read, first: [u8; 4], row: &mut [[u8; 4]]) -> io::Result<()> {
     if first[..3] == [1, 1, 1] {
         return Err(damaged("a row begins with a repetition"));
@@ -157,9 +158,9 @@ fn read_bytes<const N: usize>(reader: &mut impl Read) -> io::Result<[u8; N]> {
     Ok(bytes)
 }
 
-/// Mantissas of 8 bits, and an exponent that they share.
+/// Mantissas of 8 bits with a common exponent.
 fn radiance([r, g, b, exponent]: [u8; 4]) -> [f32; 3] {
-    // 2 to the power of the exponent less 128 and 8.
+    // 2 to the power of (exponent − 128 − 8).
     let scale = match exponent {
         0 => 0.0,
         _ => (f64::from(exponent) - 136.0).exp2() as f32,

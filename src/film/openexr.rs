@@ -18,7 +18,7 @@ use std::collections::HashMap;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Primaries and white point of Rec. ITU-R BT.709 in CIE xy: what the program means by linear RGB.
+/// Primaries and white point of Rec. ITU-R BT.709 in CIE xy: the program's linear RGB.
 const REC_709: Chromaticities = Chromaticities {
     red: Vec2(0.64, 0.33),
     green: Vec2(0.30, 0.60),
@@ -45,14 +45,14 @@ fn custom_attributes(metadata: &Metadata) -> HashMap<Text, AttributeValue> {
     attributes
 }
 
-/// What a picture has besides its colours.
+/// Additional channels of a picture.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Layers<'a> {
-    /// Channel A: the share of each pixel that shows a surface, in rows from the top left. The colours are what the camera sees,
-    /// whatever it is.
+    /// Channel A: the share of each pixel that shows a surface, in rows from the top left. Colours are not multiplied by it; they
+    /// include the background.
     pub alpha: Option<&'a [f32]>,
-    /// Channels `error_R`, `error_G`, `error_B`: the error of each pixel, as the render estimated it. No name has a dot: one
-    /// would make a file of several layers of it, whose pixels Blender doesn't give.
+    /// Channels `error_R`, `error_G`, `error_B`: the error of each pixel, as the render estimated it. Names have no dot: it would
+    /// make several layers, whose pixels Blender does not read.
     pub errors: Option<&'a Image>,
 }
 

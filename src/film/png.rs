@@ -1,4 +1,4 @@
-//! Pictures as PNG files, tone-mapped for looking at.
+//! Pictures as PNG files, tone-mapped for viewing.
 
 use super::{Image, write_whole};
 use crate::error::{Error, Result};
@@ -7,7 +7,7 @@ use std::path::Path;
 /// Writes an 8-bit sRGB PNG: radiance times 2^`exposure_ev`, the Khronos PBR Neutral tone mapper, the sRGB transfer
 /// function, rounding without dither.
 ///
-/// NaN and negative values come out as 0, infinity as the brightest value.
+/// NaN and negative values become 0, infinity the brightest value.
 ///
 /// # Errors
 /// As [`check_writable`](super::check_writable); further if the disk is full.
@@ -22,7 +22,7 @@ pub fn write_png(image: &Image, path: &Path, exposure_ev: f32) -> Result<()> {
     write_rgb8([image.width, image.height], &bytes, path)
 }
 
-/// Writes a PNG of these bytes: sRGB, three a pixel, in rows from the top left.
+/// Writes a PNG of these bytes: sRGB, three per pixel, in rows from the top left.
 ///
 /// # Errors
 /// As [`write_png`].
@@ -48,13 +48,13 @@ pub fn write_rgb8(size: [usize; 2], bytes: &[u8], path: &Path) -> Result<()> {
 fn tone_map(radiance: [f32; 3]) -> [f32; 3] {
     const START_COMPRESSION: f32 = 0.8 - 0.04;
     const DESATURATION: f32 = 0.15;
-    /// Stands for infinity; far above what a display can tell apart, far below where f32 overflows.
+    /// Replaces infinity: far above what a display distinguishes, far below the overflow of f32.
     const BRIGHTEST: f32 = 1e20;
 
     // NaN fails the comparison.
     let color = radiance.map(|value| if value > 0.0 { value.min(BRIGHTEST) } else { 0.0 });
     let darkest = color.into_iter().fold(BRIGHTEST, f32::min);
-    // What a dielectric of base colour 0 reflects at normal incidence, 0.04, is taken out of the shadows.
+    // Subtracts the reflection of a black dielectric at normal incidence, 0.04, from the shadows.
     let offset = if darkest < 0.08 {
         darkest - 6.25 * darkest * darkest
     } else {

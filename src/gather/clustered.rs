@@ -1,4 +1,4 @@
-//! The default gather: hashed grids that runs of neighbouring visible points look into.
+//! The default gather: runs of neighbouring visible points search hashed grids.
 
 use super::primitives::{PHOTON_PAIRS, scan, sort};
 use super::{gather_stage, parts};

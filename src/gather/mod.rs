@@ -22,13 +22,13 @@ pub struct GatherMethod {
     pub name: &'static str,
     /// What it does, in one line.
     pub summary: &'static str,
-    /// The paper's row that it is, or where it comes from.
+    /// The row of the paper's table, or its origin.
     pub paper: &'static str,
-    /// What it runs.
+    /// Its implementation.
     pub runs: Runs,
 }
 
-/// What a gather method runs.
+/// The implementation of a gather method.
 #[derive(Clone, Copy)]
 pub enum Runs {
     /// Stages of a Vulkan device.
@@ -39,7 +39,7 @@ pub enum Runs {
         gather: Record,
         /// How many photons a visible point tests.
         tests: Tests,
-        /// Visible points that a photon is loaded for at once.
+        /// Number of visible points that share the load of a photon.
         sharing: fn(&Sizes) -> u32,
     },
     /// A kd-tree on the CPU.
@@ -51,14 +51,14 @@ pub enum Runs {
 /// How many photons a visible point tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tests {
-    /// All of them, or all on its mesh.
+    /// All photons, or all on its mesh.
     All,
-    /// Those nearby.
+    /// Nearby photons.
     Near,
 }
 
 impl GatherMethod {
-    /// Whether it runs on a device and tests nearby photons alone.
+    /// Whether it runs on a device and tests nearby photons only.
     pub fn looks_nearby(&self) -> bool {
         matches!(self.runs, Runs::Device { tests: Tests::Near, .. })
     }
@@ -201,7 +201,7 @@ fn gather_stage(shader: &'static Shader, threads: u32, sizes: &Sizes) -> StageDe
     ])
 }
 
-/// First and end of the photons of each of a gather's launches: one launch unless the driver cuts its loops.
+/// First and end of the photons of each launch of a gather: one launch, unless the driver cuts loops.
 fn parts(sizes: &Sizes) -> impl Iterator<Item = [u32; 2]> {
     let part = sizes.photon_capacity.div_ceil(sizes.gather_parts).max(1);
     let firsts = (0..sizes.photon_capacity).step_by(part as usize);

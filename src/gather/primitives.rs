@@ -1,4 +1,4 @@
-//! Prefix sums and sorting, which every ordering on the device is made of.
+//! Prefix sums and sorting, the primitives of all orderings on the device.
 
 use crate::layout::{SCAN_BLOCK, SORT_TILE};
 use crate::record::Recording;
@@ -34,7 +34,7 @@ pub struct Pairs {
     pub values: BufferId,
 }
 
-/// Keys and values of photons, and where they go every other pass.
+/// Keys and values of photons, and the second buffers for alternate passes.
 pub const PHOTON_PAIRS: [Pairs; 2] = [
     Pairs {
         keys: BufferId::Keys,
@@ -46,7 +46,7 @@ pub const PHOTON_PAIRS: [Pairs; 2] = [
     },
 ];
 
-/// Keys and values of visible points, and where they go every other pass.
+/// Keys and values of visible points, and the second buffers for alternate passes.
 pub const POINT_PAIRS: [Pairs; 2] = [
     Pairs {
         keys: BufferId::PointKeys,
@@ -58,9 +58,8 @@ pub const POINT_PAIRS: [Pairs; 2] = [
     },
 ];
 
-/// Records a stable sort of `pairs[0]` by the low `bits` bits of the keys, back and forth between the two. `capacity` is
-/// the most pairs that there can be; how many there are stands in the buffer `count`. Returns the two with the sorted one
-/// first.
+/// Records a stable sort of `pairs[0]` by the low `bits` bits of the keys, back and forth between the two. `capacity` is the
+/// maximum number of pairs; their actual number is in the buffer `count`. Returns the two with the sorted one first.
 pub fn sort(count: BufferId, capacity: u32, bits: u32, pairs: [Pairs; 2], recording: &mut Recording) -> [Pairs; 2] {
     let tiles = capacity.div_ceil(SORT_TILE);
     let [mut here, mut there] = pairs;

@@ -1,4 +1,4 @@
-//! HDR-FLIP: how large the difference between two pictures looks to somebody who flips between them, 0 to 1 a pixel.
+//! HDR-FLIP: the visible difference of two pictures to a viewer who flips between them, 0 to 1 per pixel.
 //!
 //! Andersson and others, «FLIP: A Difference Evaluator for Alternating Images», 2020, and «Visualizing Errors in Rendered
 //! High Dynamic Range Images», 2021; constants as in the authors' implementation, at their default viewing distance. The
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::film::Image;
 
-/// Pixels a degree of a 0.7 m wide 4K monitor seen from 0.7 m.
+/// Pixels per degree of a 0.7 m wide 4K monitor seen from 0.7 m.
 const PIXELS_PER_DEGREE: f64 = 3840.0 * std::f64::consts::PI / 180.0;
 /// Radiance is clamped here.
 const BRIGHTEST: f64 = 65_536.0;
@@ -39,7 +39,7 @@ impl Planes {
         }
     }
 
-    /// Convolves each channel by its kernels along x and y; pixels past the edge are those at the edge.
+    /// Convolves each channel by its kernels along x and y; pixels beyond the edge repeat those at the edge.
     fn convolve(&self, along_x: [&[f64]; 3], along_y: [&[f64]; 3]) -> Self {
         let (width, height) = (self.width, self.height);
         let pass = |from: &[[f64; 3]], kernels: [&[f64]; 3], horizontal: bool| -> Vec<[f64; 3]> {
@@ -123,8 +123,8 @@ fn tone_map(pixel: [f64; 3], exposure: f64) -> [f64; 3] {
     })
 }
 
-/// The exposures, in stops, between which the reference's median and its brightest pixel are shown well. Black pixels, which
-/// no exposure shows, are left out where they are the median (the paper doesn't say what to do then).
+/// The range of exposures, in stops, that shows the reference's median and its brightest pixel well. If the median is black,
+/// black pixels are left out, because no exposure shows them (the paper does not define this case).
 fn exposures(reference: &Planes) -> Vec<f64> {
     let [k0, k1, k2, k3, k4, k5] = ACES;
     let c0 = (k1 - k4 * EXPOSURE_TARGET) / (k0 - k3 * EXPOSURE_TARGET);
@@ -201,12 +201,12 @@ fn linear_to_hunt_lab(rgb: [f64; 3]) -> [f64; 3] {
     [l, 0.01 * l * a, 0.01 * l * b]
 }
 
-/// HyAB distance: lightness and chroma apart.
+/// HyAB distance: lightness and chroma separately.
 fn hyab(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])
 }
 
-/// Kernels of the two pipelines, all of them products of a function of x and one of y.
+/// Kernels of the two pipelines, all separable.
 struct Filters {
     achromatic: Vec<f64>,
     red_green: Vec<f64>,
@@ -308,7 +308,7 @@ impl Filters {
         both.map(|(x, y)| [x[0].hypot(y[0]), x[1].hypot(y[1])]).collect()
     }
 
-    /// Small colour errors take up most of the range.
+    /// Small colour errors get most of the range.
     fn redistributed(&self, error: f64) -> f64 {
         let knee = P_COLOR * self.largest;
         if error < knee {

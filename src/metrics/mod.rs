@@ -1,16 +1,16 @@
-//! How far a picture is from a reference, and whether it has values that no picture should have.
+//! Error measures of a picture against a reference, and invalid values in pictures.
 
 mod flip;
 
 use crate::error::{Error, Result};
 use crate::film::Image;
 
-/// The weight of the squared mean in relMSE's denominator, which keeps dark pixels from deciding it.
+/// The weight of the squared mean in relMSE's denominator, which keeps dark pixels from dominating it.
 pub const REL_MSE_FLOOR: f64 = 0.01;
 
 /// Error measures of a picture x against a reference r; each is a mean over all pixels and channels.
 ///
-/// NaN in the picture or the reference makes them NaN: [`Defects`] says where that comes from.
+/// NaN in the picture or the reference makes them NaN; [`Defects`] counts such pixels.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Comparison {
     /// Root of the mean squared error, in units of radiance.
@@ -26,12 +26,12 @@ pub struct Comparison {
 
 pub use flip::flip;
 
-/// relMSE's denominator, the same for all values, beside the reference's own square.
+/// relMSE's denominator without the reference's square, the same for all values.
 pub(crate) fn floor_of(reference: &Image) -> f64 {
     REL_MSE_FLOOR * (mean(reference).iter().sum::<f64>() / 3.0).powi(2)
 }
 
-/// A value's part in relMSE.
+/// A value's contribution to relMSE.
 fn relative_square(x: f64, r: f64, floor: f64) -> f64 {
     (x - r).powi(2) / (r * r + floor)
 }
@@ -53,7 +53,7 @@ pub fn relative_errors(image: &Image, reference: &Image) -> Result<Vec<f32>> {
         .collect())
 }
 
-/// Pixels with values that no picture should have in any of their channels; a pixel may count in several.
+/// Numbers of pixels with invalid values in any channel; a pixel may count in several.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Defects {
     /// Pixels with a NaN.

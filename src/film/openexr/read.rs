@@ -12,13 +12,13 @@ use exr::meta::header::Header;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
-/// Pictures with more pixels than this (16,384 × 8,192) are taken for damaged files.
+/// Pictures with more pixels than this (16,384 × 8,192) are treated as damaged files.
 const MAX_PIXELS: usize = 1 << 27;
 
-/// Reads the first layer with channels R, G and B of an OpenEXR file, or else with luminance Y alone, which is grey; half, float and integer samples become `f32`,
-/// other channels are left out.
+/// Reads the first layer with channels R, G and B of an OpenEXR file, or else with luminance Y alone, which is grey; half, float
+/// and integer samples become `f32`, other channels are ignored.
 ///
-/// The picture is the file's display window: pixels that the data window lacks are black, what lies outside is cut.
+/// The picture is the file's display window: pixels that the data window lacks are black, pixels outside are cropped.
 ///
 /// # Errors
 /// A file that can't be opened, is damaged or cut short, has no such layer, has subsampled channels, or has more than
@@ -28,7 +28,7 @@ pub fn read_exr(path: &Path) -> Result<Image> {
     decode(BufReader::new(file), path)
 }
 
-/// Pixels of the largest picture in an OpenEXR file, by its headers.
+/// Number of pixels of the largest picture in an OpenEXR file, by its headers.
 ///
 /// # Errors
 /// A file that can't be opened or isn't OpenEXR.
@@ -67,7 +67,7 @@ pub(super) fn decode(source: impl Read + Seek, path: &Path) -> Result<Image> {
     };
     let levels = exr::image::read::read().no_deep_data().largest_resolution_level();
     let channels = levels.specific_channels();
-    // A decoder that panics over a damaged file would abort the process from one of rayon's threads.
+    // A decoder that panics on a damaged file would abort the process from one of rayon's threads.
     let image = if is_grey {
         channels
             .required("Y")
@@ -106,16 +106,16 @@ fn has(header: &Header, names: &[&str]) -> bool {
         .all(|&name| channels.iter().any(|channel| channel.name == *name))
 }
 
-/// Whether luminance alone is all that there is: no layer has colours, and one has luminance without chroma.
+/// Whether the file has only luminance: no layer has colours, and one has luminance without chroma.
 fn is_grey(headers: &[Header]) -> bool {
     let is_grey = |header: &Header| has(header, &["Y"]) && !has(header, &["RY"]) && !has(header, &["BY"]);
     !headers.iter().any(|header| has(header, &["R", "G", "B"])) && headers.iter().any(is_grey)
 }
 
-/// The most bytes of a block of lines or a tile: the decoder has several of them at once.
+/// Maximum size of a block of lines or a tile, in bytes: the decoder holds several of them at once.
 const MAX_BLOCK: usize = 1 << 26;
 
-/// Refuses what the `exr` crate would spend all memory on or can't do, before any pixel is read.
+/// Rejects files for which the `exr` crate would exhaust memory, or that it does not support, before any pixel is read.
 fn check_headers(headers: &[Header]) -> std::result::Result<(), &'static str> {
     let is_sound = |Vec2(width, height): Vec2<usize>| matches!(width.checked_mul(height), Some(1..=MAX_PIXELS));
     let subsampled = |header: &Header| {
@@ -140,7 +140,7 @@ fn check_headers(headers: &[Header]) -> std::result::Result<(), &'static str> {
     Ok(())
 }
 
-/// Where the pixels of a layer lie, and which part is shown.
+/// The window of a layer's pixels, and the part that is shown.
 #[derive(Clone, Copy)]
 struct Frame {
     position: Vec2<i32>,
@@ -148,7 +148,7 @@ struct Frame {
 }
 
 impl Frame {
-    /// The part that is shown, where no pixel is.
+    /// The shown part, initially without pixels.
     fn black(self) -> Image {
         let Vec2(width, height) = self.display.size;
         Image::new(width, height, vec![[0.0; 3]; width * height])

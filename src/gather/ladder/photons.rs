@@ -1,4 +1,4 @@
-//! Orders of photons, and gathering from them: what is recorded for each batch of photons.
+//! Ordering photons and gathering from them: the stages for each batch of photons.
 
 use crate::gather::primitives::scan;
 use crate::gather::{gather_stage, parts};
@@ -8,14 +8,14 @@ use crate::shaders;
 use crate::sizes::{EXHAUSTIVE_RANGE, Sizes};
 use crate::stage::{BufferId, StageDesc};
 
-/// How a gather that tests every photon goes about it.
+/// Variants of a gather that tests every photon.
 #[derive(Default, Clone, Copy)]
 struct Exhaustive {
     /// Stages blocks of photons through shared memory.
     local: bool,
-    /// Has photons sorted by mesh and tests those of the visible point's mesh alone.
+    /// Photons are sorted by mesh; only those of the visible point's mesh are tested.
     by_mesh: bool,
-    /// Has an order of visible points whose workgroups have one mesh each.
+    /// Visible points are ordered so that each workgroup has one mesh.
     ordered: bool,
     /// Uses the built-in distance().
     distance: bool,
@@ -125,7 +125,7 @@ impl Exhaustive {
     }
 }
 
-/// A factor that deals so many groups to all cores alike: it has no divisor in common with their number.
+/// A factor that distributes the groups evenly over all cores: it is coprime to their number.
 fn dealing(groups: u32) -> u32 {
     [31, 37, 41, 43, 47, 53]
         .into_iter()
@@ -133,7 +133,7 @@ fn dealing(groups: u32) -> u32 {
         .unwrap_or(1)
 }
 
-/// The paper's photon sorting: one map a mesh, filled by an atomic counter a mesh.
+/// The paper's photon sorting: one map per mesh, filled by an atomic counter per mesh.
 fn sort_by_mesh(sizes: &Sizes, recording: &mut Recording) {
     let photons = sizes.photon_capacity;
     recording.fill(BufferId::MeshEnds, 0);

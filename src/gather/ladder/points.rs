@@ -1,4 +1,4 @@
-//! Orders of visible points: what is recorded when they are new.
+//! Ordering visible points: the stages for new visible points.
 
 use crate::gather::primitives::{POINT_PAIRS, scan, sort};
 use crate::layout::{CURVE_BITS, GROUP, NO_SLOT};
@@ -29,7 +29,7 @@ pub fn by_cluster(sizes: &Sizes, recording: &mut Recording) {
     recording.dispatch(StageDesc::new(&shaders::CLUSTER_PLACE, runs).push(runs));
 }
 
-/// Sorts the points by mesh, along a curve within each if asked, and puts them with fillers into `order`.
+/// Sorts the points by mesh, optionally along a curve within each, and writes them with fillers to `order`.
 fn sort_by_mesh(sizes: &Sizes, along_curve: bool, order: BufferId, recording: &mut Recording) {
     let (slots, meshes) = (sizes.slots(), sizes.meshes);
     let mut pairs = POINT_PAIRS;
