@@ -11,7 +11,7 @@ use crate::text;
 pub(super) struct Buffer {
     pub handle: vk::Buffer,
     pub bytes: u64,
-    /// The buffer as texels of four u32, where some stage reads it so.
+    /// The buffer as texels of four u32, if a stage reads it so.
     texels: Option<vk::BufferView>,
     allocation: Option<Allocation>,
 }
@@ -79,7 +79,7 @@ impl Buffer {
         }
     }
 
-    /// The view through which texels are read, made when it is first asked for.
+    /// The view for texel reads, created at its first use.
     pub fn texels(&mut self, context: &Context) -> Result<vk::BufferView> {
         if let Some(view) = self.texels {
             return Ok(view);
@@ -102,7 +102,7 @@ impl Buffer {
             .unwrap_or_default()
     }
 
-    /// Gives the buffer back. The device must not be using it.
+    /// Frees the buffer. The device must not be using it.
     pub fn free(mut self, context: &Context) {
         // SAFETY: the caller has waited for the work that used it.
         unsafe {
@@ -112,7 +112,7 @@ impl Buffer {
             context.device.destroy_buffer(self.handle, None);
         }
         if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), context.allocator.lock()) {
-            // A failure here means that the allocation wasn't the allocator's, which it is.
+            // This fails only for an allocation of another allocator.
             let _ = allocator.free(allocation);
         }
     }

@@ -30,7 +30,7 @@ impl<T> OrVulkan<T> for std::result::Result<T, vk::Result> {
     }
 }
 
-/// What a user may want to know of a Vulkan device.
+/// Properties of a Vulkan device, for users.
 #[derive(Debug, Clone, Serialize)]
 pub struct DeviceSummary {
     /// Index in the order that Vulkan lists devices.
@@ -55,9 +55,9 @@ pub struct DeviceSummary {
     pub max_shared_memory_bytes: u32,
     /// Bytes that can be allocated at once.
     pub max_allocation_bytes: u64,
-    /// Whether it traces rays by itself (VK_KHR_ray_query).
+    /// Whether it supports ray queries (VK_KHR_ray_query).
     pub ray_query: bool,
-    /// What the device lacks to run the program; empty if nothing.
+    /// Requirements that the device does not meet; empty if it is usable.
     pub lacks: Vec<String>,
 }
 
@@ -98,12 +98,11 @@ fn has(extensions: &[vk::ExtensionProperties], name: &CStr) -> bool {
     extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name))
 }
 
-/// The instance that is alive, if one is. Loaders have been seen to crash where one thread makes an instance while
-/// another names an object.
+/// The current instance, if any. Some loaders crash if one thread creates an instance while another names an object.
 static SHARED: Mutex<Weak<VulkanInstance>> = Mutex::new(Weak::new());
 
 impl VulkanInstance {
-    /// The process's one instance.
+    /// The instance of the process.
     pub fn shared() -> Result<Arc<Self>> {
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(instance) = shared.upgrade() {
@@ -133,7 +132,7 @@ impl VulkanInstance {
                 .enumerate_instance_extension_properties(None)
                 .or_vulkan("vkEnumerateInstanceExtensionProperties")?;
             let debug_utils = validate || has(&extensions, ext::debug_utils::NAME);
-            // MoltenVK is listed to those alone who say that they know of it.
+            // MoltenVK is listed only with this flag.
             let portability = has(&extensions, khr::portability_enumeration::NAME);
             let application = vk::ApplicationInfo::default()
                 .application_name(c"ppm-vk")
@@ -283,7 +282,7 @@ impl VulkanInstance {
         }
     }
 
-    /// Whether a device's driver tells what it compiles kernels to.
+    /// Whether a device's driver reports statistics of compiled kernels.
     pub fn tells_statistics(&self, device: vk::PhysicalDevice) -> Result<bool> {
         Ok(has(
             &self.extensions(device)?,
@@ -291,7 +290,7 @@ impl VulkanInstance {
         ))
     }
 
-    /// Whether a device traces rays by itself.
+    /// Whether a device supports ray queries.
     fn traces_rays(&self, device: vk::PhysicalDevice) -> bool {
         let found = self.extensions(device).unwrap_or_default();
         ray_tracing::EXTENSIONS.iter().all(|name| has(&found, name)) && ray_tracing::has_features(&self.handle, device)
@@ -303,7 +302,7 @@ impl VulkanInstance {
             .or_vulkan("vkEnumerateDeviceExtensionProperties")
     }
 
-    /// A queue family that computes, and its timestamps' valid bits; one without graphics where there is a choice.
+    /// A compute queue family, preferably without graphics, and the valid bits of its timestamps.
     pub fn compute_family(&self, device: vk::PhysicalDevice) -> Option<(u32, u32)> {
         // SAFETY: the device belongs to this instance.
         let families = unsafe { self.handle.get_physical_device_queue_family_properties(device) };
@@ -343,15 +342,15 @@ pub(super) struct Context {
     pub family: u32,
     pub timestamp_bits: u32,
     debug: Option<ext::debug_utils::Device>,
-    /// Where the device traces rays by itself.
+    /// If the device supports ray queries.
     pub ray_tracing: Option<RayTracing>,
-    /// Whether kernels are only compiled. A device that isn't there can't be waited for.
+    /// Whether kernels are only compiled. One cannot wait for a null device.
     compiles_only: bool,
     pub instance: Arc<VulkanInstance>,
 }
 
 impl Context {
-    /// `compiles_only`: to ask what kernels are compiled to, and run none.
+    /// `compiles_only`: to get statistics of compiled kernels, without running any.
     pub fn new(instance: Arc<VulkanInstance>, physical: vk::PhysicalDevice, compiles_only: bool) -> Result<Self> {
         let (family, timestamp_bits) = instance
             .compute_family(physical)
@@ -364,7 +363,7 @@ impl Context {
         unsafe {
             let extensions = instance.extensions(physical)?;
             let mut names = Vec::new();
-            // A device that has it (MoltenVK) demands it. None of what such a device may lack is used here.
+            // A device that has it (MoltenVK) requires it. No feature that such a device may lack is used.
             if has(&extensions, khr::portability_subset::NAME) {
                 names.push(khr::portability_subset::NAME.as_ptr());
             }
@@ -452,7 +451,7 @@ impl Context {
         }
     }
 
-    /// What the validation layer said since the last call.
+    /// Messages of the validation layer since the last call.
     pub fn take_messages(&self) -> Vec<String> {
         self.instance
             .messages

@@ -1,4 +1,4 @@
-//! Descriptor sets: made when a launch first has its buffers, and kept for as long as those are the same.
+//! Descriptor sets: created at the first launch with its buffers, and kept as long as the buffers are the same.
 
 use std::collections::HashMap;
 
@@ -20,7 +20,7 @@ pub(super) struct Descriptors {
 }
 
 impl Descriptors {
-    /// Forgets all sets. The device must not be using them.
+    /// Drops all sets. The device must not be using them.
     pub fn free(&mut self, context: &Context) {
         self.sets.clear();
         for pool in self.pools.drain(..) {

@@ -1,4 +1,4 @@
-//! A device with its buffers: what the rest of the program sees of Vulkan.
+//! A device with its buffers: the interface of src/gpu.
 
 use std::collections::HashMap;
 
@@ -28,7 +28,7 @@ pub fn devices() -> Result<Vec<DeviceSummary>> {
         .collect())
 }
 
-/// The device that is taken where the user names none.
+/// The default device.
 ///
 /// # Errors
 /// No loader, or no device.
@@ -45,9 +45,9 @@ pub struct Device {
     pub(super) descriptors: Descriptors,
     pub(super) acceleration: Option<Acceleration>,
     pub(super) slots: Slots,
-    /// Nanoseconds that an invocation of each stage took when it last ran.
+    /// Time per invocation of each stage in its last run, in nanoseconds.
     pub(super) thread_ns: HashMap<&'static str, f64>,
-    // Last: everything above is made from it.
+    // Last, because everything above is created from it.
     pub(super) context: Context,
 }
 
@@ -83,12 +83,12 @@ impl Device {
         &self.summary
     }
 
-    /// Whether the validation layer watches: in debug builds, where it is installed.
+    /// Whether the validation layer is active: in debug builds, if it is installed.
     pub fn is_validated(&self) -> bool {
         self.context.instance.is_validated()
     }
 
-    /// Makes (or makes anew, with undefined content) the buffer `id`.
+    /// Creates the buffer `id`, or replaces it, with undefined content.
     ///
     /// # Errors
     /// No memory, or more bytes than the device can bind.
@@ -108,7 +108,7 @@ impl Device {
         Ok(())
     }
 
-    /// Gives back the memory of the buffer `id`.
+    /// Frees the memory of the buffer `id`.
     pub(super) fn remove(&mut self, id: BufferId) {
         if let Some(buffer) = self.buffers.remove(&id) {
             if self.slots.are_busy() {
@@ -120,7 +120,7 @@ impl Device {
         }
     }
 
-    /// Makes the buffer `id` with this content, or gives the one of that size another.
+    /// Creates the buffer `id` with this content, or overwrites one of the same size.
     ///
     /// # Errors
     /// As [`Device::create`], and failed Vulkan calls.
@@ -151,7 +151,7 @@ impl Device {
     }
 }
 
-/// What makes a buffer smaller.
+/// Advice that makes a buffer smaller.
 pub(crate) fn remedy(id: BufferId) -> Remedy {
     match id {
         BufferId::Textures | BufferId::Texels => Remedy::SmallerTextures,
@@ -217,7 +217,7 @@ pub(super) fn choose(
     Ok(devices.swap_remove(position))
 }
 
-/// The place of the device that a user means: by its index, its name, or a part of its name that no other device's has.
+/// The index of the device that a user names: by index, by name, or by a part of its name that is unique.
 fn named(devices: &[(vk::PhysicalDevice, DeviceSummary)], choice: &str) -> Result<Option<usize>> {
     let index: Option<usize> = choice.parse().ok();
     if let Some(found) = devices.iter().position(|(_, summary)| Some(summary.index) == index) {

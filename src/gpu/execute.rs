@@ -12,26 +12,26 @@ use crate::error::{Error, Result};
 use crate::record::{Command, Launch, Piece, Recording, Run};
 use crate::stage::{BufferId, StageDesc};
 
-/// Nanoseconds of work that one submission should have at the most: drivers take a device for dead after 2 to 10 seconds,
-/// and the machine's screen waits for the end of a submission.
+/// Maximum work of a submission, in nanoseconds: drivers reset a device after 2 to 10 seconds, and the desktop waits for the end
+/// of a submission.
 const MOST_NS: f64 = 100e6;
 
-/// Work that has been given to the device.
+/// A submitted piece of work.
 #[must_use]
 pub struct Ticket(usize);
 
 /// A launch's pipeline and its descriptor sets.
 type Bound = (Pipeline, Vec<vk::DescriptorSet>);
 
-/// What a recording took, and what it read back.
+/// Times of a recording, and the data that it read back.
 pub struct Done {
-    /// Its launches.
+    /// Times of its launches.
     pub run: Run,
     read: Vec<(BufferId, Vec<u8>)>,
 }
 
 impl Done {
-    /// What was read back of the buffer `id`; nothing where the recording didn't say so.
+    /// The data that was read back of the buffer `id`; empty if the recording reads none.
     pub fn read<T: bytemuck::AnyBitPattern>(&self, id: BufferId) -> Vec<T> {
         let read = self.read.iter().find(|(read, _)| *read == id);
         read.map_or_else(Vec::new, |(_, bytes)| elements(bytes))
@@ -56,7 +56,7 @@ impl Device {
         self.finish(ticket).map(|done| done.run)
     }
 
-    /// Gives a recording to the device, which does it after all that it was given before.
+    /// Submits a recording, to run after all earlier submissions.
     ///
     /// # Errors
     /// As [`Device::run`].
@@ -177,13 +177,13 @@ impl Device {
         })
     }
 
-    /// Waits for work that was given to the device.
+    /// Waits for submitted work.
     ///
     /// # Errors
     /// A failed Vulkan call, or, in debug builds, anything that the validation layer says.
     pub fn finish(&mut self, ticket: Ticket) -> Result<Done> {
         self.wait(ticket.0)?;
-        // What waits for the work before isn't this one's.
+        // Waiting for earlier work does not count as time of this work.
         let begin = self.slots.waited.max(self.slot(ticket.0).0.submitted);
         self.slots.waited = std::time::Instant::now();
         let wall = self.slots.waited - begin;
@@ -205,7 +205,7 @@ impl Device {
         })
     }
 
-    /// What a launch takes, by the longest one of its stage in the last run that had it.
+    /// The expected time of a launch, by the longest one of its stage in the last run that had it.
     fn expected_ns(&self, stage: &StageDesc) -> Option<f64> {
         let of_thread = self.thread_ns.get(stage.shader.name)?;
         Some(of_thread * f64::from(stage.threads))
@@ -251,7 +251,7 @@ impl Device {
         Ok(slot.launches.iter().map(timed).collect())
     }
 
-    /// The first `count` elements of the buffer `id`; all where `count` is `None`.
+    /// The first `count` elements of the buffer `id`; all if `count` is `None`.
     ///
     /// # Errors
     /// No such buffer, or a failed Vulkan call.
@@ -320,7 +320,7 @@ fn dispatch(
     context.end_label(commands);
 }
 
-/// Workgroups of each of so many pieces, in rows of no more than every device allows; at least `groups` of all of them.
+/// Workgroups of each of `pieces` pieces, in rows that every device allows; at least `groups` in total.
 fn layout_of(groups: u32, pieces: u32) -> [u32; 2] {
     let rows = groups.div_ceil(65_535 * pieces);
     [groups.div_ceil(rows * pieces), rows]

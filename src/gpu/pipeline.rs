@@ -24,7 +24,7 @@ pub(super) struct Pipeline {
     pub handle: vk::Pipeline,
     pub layout: vk::PipelineLayout,
     pub set_layout: vk::DescriptorSetLayout,
-    /// Whether the device traces its rays by itself, through what a second set binds.
+    /// Whether it uses ray queries, with the acceleration structure in a second set.
     pub ray_query: bool,
 }
 
@@ -49,7 +49,7 @@ pub(super) fn descriptor_type(access: Access) -> vk::DescriptorType {
 }
 
 impl Pipelines {
-    /// None yet.
+    /// An empty cache.
     pub fn new(cache: PipelineCache, flags: vk::PipelineCreateFlags) -> Self {
         Self {
             cache,
@@ -59,12 +59,12 @@ impl Pipelines {
         }
     }
 
-    /// The pipeline for a launch, made when it is first asked for.
+    /// The pipeline for a launch, created at its first use.
     pub fn get(&mut self, context: &Context, stage: &StageDesc) -> Result<Pipeline> {
         let shader = stage.shader;
         let mut constants: Vec<(u32, u32)> = Vec::new();
         for (name, value) in stage.constants.iter() {
-            // A stage that doesn't use a constant has it compiled away; setting it is no error.
+            // A stage may not use a constant; setting it is no error.
             if let Some(constant) = shader.constants.iter().find(|constant| constant.name == *name) {
                 constants.push((constant.id, *value));
             }

@@ -1,6 +1,5 @@
-//! Compiled pipelines in the user's cache folder, so that a driver compiles each kernel once and not in every run.
-//!
-//! A cache is no output: where there is no folder, or it can't be read or written, kernels are compiled anew.
+//! A cache of compiled pipelines in the user's cache folder, so that a driver compiles each kernel once and not in every run. The
+//! cache is optional: without a folder, or if it can't be read or written, kernels are compiled again.
 
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -12,21 +11,21 @@ use super::context::{Context, OrVulkan};
 use crate::error::Result;
 use crate::files::{self, Writing};
 
-/// Larger files are not what this program wrote.
+/// Larger files were not written by this program.
 const MOST_BYTES: u64 = 256 << 20;
-/// Bytes of the checksum before the driver's own.
+/// Size of the checksum before the driver's data, in bytes.
 const CHECKSUM: usize = 8;
 
-/// A driver's cache, and the file that it comes from and goes to.
+/// A driver's cache and its file.
 pub(super) struct PipelineCache {
     pub handle: vk::PipelineCache,
     file: Option<PathBuf>,
-    /// What the file had, and has no need to be written again.
+    /// Content of the file, which need not be written again.
     known: Vec<u8>,
 }
 
 impl PipelineCache {
-    /// Opens the cache of a device; an empty one where the file isn't there, is damaged, or another driver's.
+    /// Opens the cache of a device; an empty one if the file is missing, damaged, or of another driver.
     pub fn open(context: &Context, physical: vk::PhysicalDevice) -> Result<Self> {
         // SAFETY: the physical device belongs to the context's instance.
         let properties = unsafe { context.instance.handle.get_physical_device_properties(physical) };
@@ -50,7 +49,7 @@ impl PipelineCache {
         Ok(Self { handle, file, known })
     }
 
-    /// One that nothing is read into and that isn't kept.
+    /// An empty cache that is not saved.
     pub fn empty(context: &Context) -> Result<Self> {
         let create = vk::PipelineCacheCreateInfo::default();
         // SAFETY: a plain creation call; `free` destroys what it makes.
@@ -63,14 +62,14 @@ impl PipelineCache {
         })
     }
 
-    /// Writes what is new, and destroys the cache.
+    /// Saves new content, and destroys the cache.
     pub fn free(&mut self, context: &Context) {
         // SAFETY: the caller makes no more pipelines with it.
         let data = unsafe { context.device.get_pipeline_cache_data(self.handle) };
         if let (Ok(data), Some(file)) = (data, &self.file)
             && data != self.known
         {
-            // Another run may hold the same file: it is replaced as a whole.
+            // Another process may use the same file, so it is replaced atomically.
             let _ = write(file, &data);
         }
         // SAFETY: as above.
@@ -92,7 +91,7 @@ fn folder() -> Option<PathBuf> {
         .map(|cache| cache.join("ppm-vk"))
 }
 
-/// FNV-1a: tells a file that was cut or changed.
+/// FNV-1a: detects a file that was truncated or changed.
 fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
@@ -100,7 +99,7 @@ fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
     hash.to_le_bytes()
 }
 
-/// The driver's part of a file, if it is whole.
+/// The driver's part of a file, if the file is intact.
 fn read(file: &Path) -> Option<Vec<u8>> {
     let opened = files::open(file).ok()?;
     if opened.metadata().ok()?.len() > MOST_BYTES {

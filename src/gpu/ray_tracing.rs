@@ -1,5 +1,4 @@
-//! Acceleration structures: what a device with VK_KHR_ray_query traces rays through by itself. They are of the triangles' boxes; see
-//! `glsl/shared/ray_query.glsl`.
+//! Acceleration structures for VK_KHR_ray_query, over the boxes of triangles; see `glsl/trace/ray_query.glsl`.
 
 use std::collections::BTreeMap;
 use std::ffi::CStr;
@@ -15,26 +14,26 @@ use super::device::Device;
 use crate::error::{Error, Result};
 use crate::layout::{Instance, ShadingTriangle};
 
-/// What a device must have.
+/// Required extensions.
 pub(super) const EXTENSIONS: [&CStr; 3] = [
     khr::acceleration_structure::NAME,
     khr::ray_query::NAME,
     khr::deferred_host_operations::NAME,
 ];
 
-/// Structures lie at multiples of it.
+/// Alignment of structures.
 const ALIGNMENT: u64 = 256;
 /// Every ray sees every instance.
 const ALL: u32 = 0xff << 24;
 
-/// A device's functions, and how a stage binds what rays are traced through.
+/// A device's functions, and the layout of the set that binds the acceleration structure.
 pub(super) struct RayTracing {
     functions: khr::acceleration_structure::Device,
     pub set_layout: vk::DescriptorSetLayout,
     scratch_alignment: u64,
 }
 
-/// Whether a device that has [`EXTENSIONS`] has the features too.
+/// Whether a device with [`EXTENSIONS`] has the features too.
 pub(super) fn has_features(instance: &ash::Instance, physical: vk::PhysicalDevice) -> bool {
     let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
@@ -107,7 +106,7 @@ impl Acceleration {
     }
 }
 
-/// A structure that is to be built.
+/// A structure to be built.
 struct Plan<'a> {
     geometry: vk::AccelerationStructureGeometryKHR<'a>,
     ty: vk::AccelerationStructureTypeKHR,
@@ -180,7 +179,7 @@ impl<'a> Plan<'a> {
             .geometries(std::slice::from_ref(&self.geometry))
     }
 
-    /// Records the build, and that all after it waits for it.
+    /// Records the build and a barrier after it.
     fn build(&self, context: &Context, tracing: &RayTracing, commands: vk::CommandBuffer, scratch: vk::DeviceAddress) {
         let mut description = self.description();
         description.dst_acceleration_structure = self.structure;
@@ -213,10 +212,10 @@ impl<'a> Plan<'a> {
 /// Two corners of three f32.
 const BYTES_OF_BOX: u64 = 24;
 
-/// What boxes are widened by in render space, where triangles lie within about ±1: a device may round a ray's way into a box as it likes.
+/// Margin of boxes in render space, where triangles lie within about ±1: the rounding of a device's box test is unspecified.
 const WIDENING: f64 = 1.0 / 65536.0;
 
-/// Boxes of the triangles, widened by what roundings in render space come to in the space of each.
+/// Boxes of the triangles, widened by the margin of render space, transformed to the space of each.
 fn boxes(triangles: &[ShadingTriangle], ranges: &BTreeMap<u32, Range<u32>>, instances: &[Instance]) -> Vec<[Vec3; 2]> {
     let corner = |[x, y, z, _]: [f32; 4]| Vec3::new(x, y, z);
     let mut boxes: Vec<[Vec3; 2]> = triangles
@@ -241,7 +240,7 @@ fn boxes(triangles: &[ShadingTriangle], ranges: &BTreeMap<u32, Range<u32>>, inst
     boxes
 }
 
-/// How large coordinates of places in render space become in an instance's, where its triangles lie within about ±1.
+/// The scale of a distance in render space in the space of an instance, where its triangles lie within about ±1.
 fn largest_coordinate(rows: &[[f32; 4]; 3]) -> f64 {
     let [x, y, z] = rows.map(|row| row.map(f64::from));
     let linear = DMat3::from_cols_array_2d(&[x, y, z].map(|[a, b, c, _]| [a, b, c])).transpose();
@@ -251,7 +250,7 @@ fn largest_coordinate(rows: &[[f32; 4]; 3]) -> f64 {
     1.0 + (abs * (DVec3::ONE + from.abs())).max_element()
 }
 
-/// The ranges of triangles that are one structure each: those in render space, where there are any, then what instances share, by the
+/// The ranges of triangles that are one structure each: those in render space, if any, then those that instances share, by the
 /// first triangle.
 fn ranges_of(own_triangles: u32, instances: &[Instance]) -> BTreeMap<u32, Range<u32>> {
     let own = (own_triangles > 0).then_some(0..own_triangles);
@@ -264,7 +263,7 @@ fn ranges_of(own_triangles: u32, instances: &[Instance]) -> BTreeMap<u32, Range<
         .collect()
 }
 
-/// An instance as the device reads it: rows of its map, mask, flags, structure.
+/// An instance in the device's layout: rows of its transform, mask, flags, structure.
 fn record_of(rows: &[[f32; 4]; 3], structure: vk::DeviceAddress) -> Vec<u8> {
     let mut record = bytemuck::cast_slice(rows).to_vec();
     for word in [ALL, 0] {
@@ -277,11 +276,11 @@ fn record_of(rows: &[[f32; 4]; 3], structure: vk::DeviceAddress) -> Vec<u8> {
 const UNPLACED: [[f32; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 impl Device {
-    /// Builds what rays are traced through by the device itself: `own_triangles` of the triangles are in render space, the others
-    /// where instances put them.
+    /// Builds the acceleration structures: the first `own_triangles` triangles are in render space, the others are placed by
+    /// instances.
     ///
     /// # Errors
-    /// A device that traces no rays, no memory, or a failed Vulkan call.
+    /// A device without ray queries, no memory, or a failed Vulkan call.
     pub fn trace_through(
         &mut self,
         triangles: &[ShadingTriangle],
@@ -299,7 +298,7 @@ impl Device {
         built
     }
 
-    /// `temporary` is of no use once it is built.
+    /// `temporary` is not needed after the build.
     fn build(
         &mut self,
         triangles: &[ShadingTriangle],
@@ -320,7 +319,7 @@ impl Device {
             .map(|range| Plan::boxes(tracing, boxes, range))
             .collect();
 
-        // From here on what fails leaves something to free.
+        // From here on, failures have to free resources.
         let mut made = Acceleration {
             structures: Vec::new(),
             buffers: Vec::new(),
@@ -338,7 +337,7 @@ impl Device {
                     unsafe { tracing.functions.get_acceleration_structure_device_address(&info) }
                 })
             };
-            // A structure of address 0 is an instance that no ray meets.
+            // An instance whose structure has the address 0 is inactive.
             let own = if own_triangles > 0 { address_of(0) } else { 0 };
             let mut records = record_of(&UNPLACED, own);
             for instance in instances {
@@ -403,7 +402,7 @@ fn address(context: &Context, buffer: &Buffer) -> vk::DeviceAddress {
     unsafe { context.device.get_buffer_device_address(&info) }
 }
 
-/// Puts what structures are built from where the device finds it, and tells its address: a multiple of 16.
+/// Uploads the input of a build; returns its device address, a multiple of 16.
 fn input(context: &Context, name: &str, content: &[u8], into: &mut Vec<Buffer>) -> Result<vk::DeviceAddress> {
     let usage = vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR;
     let bytes = content.len() as u64 + 16;
@@ -416,7 +415,7 @@ fn input(context: &Context, name: &str, content: &[u8], into: &mut Vec<Buffer>) 
     Ok(aligned)
 }
 
-/// Makes structures side by side in one buffer.
+/// Creates structures side by side in one buffer.
 fn make_structures(
     context: &Context,
     tracing: &RayTracing,

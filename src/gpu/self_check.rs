@@ -1,4 +1,4 @@
-//! What the device does that no limit of Vulkan's says.
+//! Properties of a device that Vulkan does not report.
 
 use super::device::Device;
 use crate::error::Result;
@@ -6,17 +6,17 @@ use crate::record::Recording;
 use crate::shaders;
 use crate::stage::{BufferId, StageDesc};
 
-/// Mesa's llvmpipe ended loops at 65,535 iterations for years; a driver that does more than this does all.
+/// Older versions of Mesa's llvmpipe end loops at 65,535 iterations; a driver that allows more than this has no limit.
 const ASKED: u32 = 70_000;
 
-/// Bytes that the copy moves in each direction, where the device binds as many.
+/// Size of the copy in each direction in bytes, if the device can bind it.
 const COPIED: u64 = 64 << 20;
-/// Copies, of which the median counts.
+/// Number of copies; the median counts.
 const COPIES: usize = 9;
 
 impl Device {
-    /// Loop iterations after which the driver ends all loops of an invocation; `u32::MAX` if it doesn't. Measured when it is
-    /// first asked.
+    /// Loop iterations after which the driver ends all loops of an invocation; `u32::MAX` if it does not. Measured at the first
+    /// call.
     ///
     /// # Errors
     /// No memory, or a failed Vulkan call.
@@ -37,7 +37,7 @@ impl Device {
         Ok(limit)
     }
 
-    /// Bytes a second that a kernel reads and writes when it copies, both counted.
+    /// Bytes per second that a copying kernel reads and writes together.
     ///
     /// # Errors
     /// No memory, or a failed Vulkan call.

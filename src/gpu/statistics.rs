@@ -1,5 +1,5 @@
-//! What a driver's compiler says of kernels: registers, spills, how many subgroups fit. Needs VK_KHR_pipeline_executable_properties.
-//! RADV compiles for a card that isn't there (RADV_FORCE_FAMILY), so nothing is run here.
+//! Statistics of compiled kernels by the driver: registers, spills, subgroups that fit. Needs
+//! VK_KHR_pipeline_executable_properties. RADV compiles for absent GPUs too (RADV_FORCE_FAMILY), so nothing is run here.
 
 use ash::{khr, vk};
 
@@ -22,7 +22,7 @@ impl Compiler {
     /// Opens the device that `choice` names or numbers, or the best.
     ///
     /// # Errors
-    /// No such device, or a driver that says nothing of what it compiles.
+    /// No such device, or a driver that reports no statistics.
     pub fn open(choice: Option<&str>) -> Result<Self> {
         let instance = VulkanInstance::shared()?;
         let (physical, summary) = choose(instance.devices()?, choice)?;
@@ -53,7 +53,7 @@ impl Compiler {
         &self.summary
     }
 
-    /// What the compiler says of a stage's kernel: figures by the driver's names, in its order.
+    /// Statistics of a stage's kernel, with the driver's names and order.
     ///
     /// # Errors
     /// A kernel that doesn't compile.

@@ -1,5 +1,4 @@
-//! What work in flight needs besides buffers: command buffers, a fence, timestamp queries and read-backs, all made once
-//! and used again.
+//! Resources of work in flight: command buffers, a fence, timestamp queries and read-backs, all created once and reused.
 
 use std::collections::HashMap;
 use std::time::Instant;
@@ -17,13 +16,13 @@ use crate::stage::BufferId;
 pub(super) struct SlotLaunch {
     pub stage: &'static str,
     pub threads: u32,
-    /// Into which it is divided, each with two timestamps.
+    /// Number of pieces that it is divided into, each with two timestamps.
     pub pieces: u32,
 }
 
-/// One piece of work that is in flight, or what a former one has left for the next.
+/// A piece of work in flight, or the resources of a completed one for the next.
 pub(super) struct Slot {
-    /// As many as the work was ever parted into.
+    /// As many as the largest number of parts so far.
     commands: Vec<vk::CommandBuffer>,
     fence: vk::Fence,
     pub queries: vk::QueryPool,
@@ -59,7 +58,7 @@ impl Slot {
         2 * self.launches.iter().map(|launch| launch.pieces).sum::<u32>()
     }
 
-    /// Room for so many timestamps.
+    /// Ensures capacity for this number of timestamps.
     pub fn make_queries(&mut self, context: &Context, count: u32) -> Result<()> {
         if count <= self.query_room {
             return Ok(());
@@ -81,7 +80,7 @@ impl Slot {
         Ok(())
     }
 
-    /// Where the host finds so many bytes of a buffer.
+    /// A read-back buffer for this number of bytes.
     pub fn make_read_back(&mut self, context: &Context, id: BufferId, bytes: u64) -> Result<()> {
         if self.read_back.get(&id).is_some_and(|buffer| buffer.bytes >= bytes) {
             return Ok(());
@@ -111,7 +110,7 @@ impl Slot {
 pub(super) struct Slots {
     pool: vk::CommandPool,
     all: Vec<Slot>,
-    /// When work was last waited for.
+    /// Time when the host last finished waiting for work.
     pub waited: Instant,
 }
 
@@ -173,7 +172,7 @@ impl Device {
         (&mut self.slots.all[slot], &self.context)
     }
 
-    /// Records and submits the slot's work, in so many parts that follow each other.
+    /// Records and submits the slot's work, in consecutive parts.
     pub(super) fn submit(
         &mut self,
         slot: usize,
@@ -229,7 +228,7 @@ impl Device {
     }
 }
 
-/// Everything before is finished and visible to everything after.
+/// All earlier commands finish and are visible to all later ones.
 pub(super) fn barrier(context: &Context, commands: vk::CommandBuffer) {
     let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
     let barrier = vk::MemoryBarrier::default()
@@ -250,7 +249,7 @@ pub(super) fn barrier(context: &Context, commands: vk::CommandBuffer) {
     }
 }
 
-/// What was copied to the host's buffers is visible to it.
+/// Copies to read-back buffers are visible to the host.
 pub(super) fn barrier_to_host(context: &Context, commands: vk::CommandBuffer) {
     let to_host = vk::MemoryBarrier::default()
         .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)

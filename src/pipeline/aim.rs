@@ -12,12 +12,12 @@ use crate::packing::PackedScene;
 use crate::stage::BufferId;
 
 impl Renderer {
-    /// Where photon paths start that are aimed; `None` for those that aren't.
+    /// The state of aimed photon paths; `None` if paths are not aimed.
     pub fn aim(&self) -> Option<&Aim> {
         self.aim.as_ref()
     }
 
-    /// Aims photon paths by pilot rounds, if they are to be aimed, at what the visible points at hand want.
+    /// Aims photon paths by pilot rounds, if configured, at the demand of the current visible points.
     pub(super) fn choose_aim(&mut self, scene: &PackedScene) -> Result<()> {
         if self.config.emission != EmissionChoice::Aimed {
             return Ok(());
@@ -42,7 +42,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Where sequences begin anew paths may be aimed anew: what an iteration learns changes no sequence.
+    /// The emission table changes only when sequences begin anew, so that learning changes no sequence.
     pub(super) fn begin_block(&mut self, iteration: u32) -> Result<()> {
         if self.aim.is_none() || !self.config.begins_sequences(iteration) {
             return Ok(());
@@ -61,7 +61,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Learns from what the first of an iteration's paths were worth.
+    /// Learns from the values of an iteration's first paths.
     pub(super) fn learn(&mut self, iteration: u32, values: &[u32]) {
         if let Some(aim) = &mut self.aim
             && !values.is_empty()
@@ -70,7 +70,7 @@ impl Renderer {
         }
     }
 
-    /// What the first of an iteration's paths were worth, of which the first batch has had so many.
+    /// The values of an iteration's first paths; the first batch has this number of them.
     fn path_values(&mut self, iteration: u32, paths: u32) -> Result<Vec<u32>> {
         let count = paths.min(counted_paths(iteration)) as usize;
         self.device.download(BufferId::PathValues, Some(count))
@@ -78,7 +78,7 @@ impl Renderer {
 
     fn upload_table(&mut self, table: &Table) -> Result<()> {
         let mut texels = table.texels();
-        // As large as it may become.
+        // With its maximum size.
         let bytes = self.sizes.bytes(BufferId::EmissionTable).unwrap_or_default();
         assert!(
             texels.len() * size_of::<[u32; 4]>() <= bytes as usize,

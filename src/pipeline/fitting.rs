@@ -1,4 +1,5 @@
-//! Whether a device can have a render's buffers: told before anything is uploaded or compiled, with what to do.
+//! Checks that a device can bind and allocate a render's buffers, before anything is uploaded or compiled, with advice if it
+//! cannot.
 
 use std::collections::BTreeMap;
 
@@ -13,15 +14,15 @@ use crate::sizes::{Limits, Sizes};
 use crate::stage::{Access, BufferId};
 use crate::text;
 
-/// A buffer that a device can't have.
+/// A buffer that exceeds a device's limits.
 struct TooLarge {
     id: BufferId,
     bytes: u64,
-    /// What the device can.
+    /// The limit of the device.
     most: String,
 }
 
-/// Tells the first buffer that doesn't fit, and what makes it smaller.
+/// Reports the first buffer that does not fit, with advice.
 pub(super) fn check_fits(
     scene: &PackedScene,
     config: &RenderConfig,
@@ -77,7 +78,7 @@ fn too_large(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary,
     })
 }
 
-/// The buffers that launches use, and whether one reads them as texels.
+/// The buffers that launches use, and whether they are read as texels.
 fn uses(recordings: &[Recording]) -> BTreeMap<BufferId, bool> {
     let mut uses = BTreeMap::new();
     for command in recordings.iter().flat_map(Recording::commands) {
@@ -130,7 +131,7 @@ mod tests {
         check_fits(&scene, &config, device, limits(device, u32::MAX, &scene))
     }
 
-    /// The resolution that an error advises.
+    /// The resolution in an error's advice.
     fn advised(error: &Error) -> [u32; 2] {
         match error {
             Error::Unfit {
@@ -143,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_picture_of_more_texels_than_a_device_reads_is_told_with_one_that_fits() {
-        // As SwiftShader has it.
+        // The limit of SwiftShader.
         let swift = device(1 << 16, 1 << 30);
         check("cornell", [64, 64], &swift).expect("64x64 fits");
         let error = check("cornell", [640, 480], &swift).expect_err("640x480 doesn't");

@@ -1,4 +1,4 @@
-//! Running an iteration: batch by batch, and again where something didn't fit.
+//! Running an iteration: batch by batch, with retries if something did not fit.
 
 use bytemuck::Zeroable;
 
@@ -14,28 +14,28 @@ use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
 use crate::stage::BufferId;
 
-/// How often an iteration is done at the most: every other time halves what its loops have to do.
+/// Maximum number of attempts at an iteration: every second one halves the length of its loops.
 const REPEATS: u32 = 24;
-/// Nanoseconds that an iteration takes at the most for the next one to be begun before it is done: beside longer ones the
-/// host's gap is nothing, and who asks to stop would wait for both.
+/// Maximum duration of an iteration, in nanoseconds, for which the next one is submitted ahead: for longer ones the host's gap is
+/// negligible, and a request to stop would wait for both.
 const MOST_AHEAD_NS: f64 = 100e6;
 
-/// An iteration of one batch that the device was given.
+/// A submitted iteration of one batch.
 pub(super) struct Begun {
     ticket: Ticket,
     added: Totals,
 }
 
-/// What came of an iteration, or of its first batches.
+/// The result of an iteration, or of its first batches.
 pub(super) struct Ended {
     status: StatusCounters,
-    /// What counts: nothing where the iteration was cut short and is left out.
+    /// Totals to add: zero if the iteration was interrupted and is left out.
     added: Totals,
-    /// What the first paths were worth, where that is learned from.
+    /// Values of the first paths, if they are learned from.
     values: Vec<u32>,
 }
 
-/// Adds what the stages have reported since the status was `before`.
+/// Adds the change of the status since `before` to the counters.
 fn count(counters: &mut Counters, before: &StatusCounters, now: &StatusCounters) {
     let since = |of: fn(&StatusCounters) -> u32| u64::from(of(now).wrapping_sub(of(before)));
     counters.photons_stored += now.photons_stored() - before.photons_stored();
@@ -53,8 +53,8 @@ fn status_of(done: &Done) -> Result<StatusCounters> {
 }
 
 impl Renderer {
-    /// Runs what `record` says; where photons don't fit or loops are cut, makes room and does it again. Returns what all
-    /// of it took, and what the last run reported.
+    /// Runs the recording of `record`; if photons do not fit or loops are cut, enlarges buffers and repeats it. Returns the time
+    /// of all attempts, and the status of the last one.
     pub(super) fn run_until_it_fits(
         &mut self,
         record: impl Fn(Stages<'_>) -> Recording,
@@ -66,7 +66,7 @@ impl Renderer {
         })
     }
 
-    /// Runs a recording that began with [`reporting`]; returns what it reported as well.
+    /// Runs a recording that began with [`reporting`]; also returns its status.
     pub(super) fn run_reporting(&mut self, mut recording: Recording) -> Result<(Run, StatusCounters)> {
         self.reported = None;
         let ticket = self.submit(&mut recording)?;
@@ -75,14 +75,14 @@ impl Renderer {
         Ok((done.run, status))
     }
 
-    /// Gives the device a recording whose status comes back with it.
+    /// Submits a recording that reads its status back.
     fn submit(&mut self, recording: &mut Recording) -> Result<Ticket> {
         recording.read_back(BufferId::Status, u64::MAX);
         self.make_buffers(recording)?;
         self.device.begin(recording)
     }
 
-    /// The same of what is more than one recording: `work` adds what it took and returns the status.
+    /// The same for several recordings: `work` adds their time and returns the status.
     fn do_until_it_fits(
         &mut self,
         mut work: impl FnMut(&mut Self, &mut Run) -> Result<StatusCounters>,
@@ -96,7 +96,7 @@ impl Renderer {
                 return Ok((all, status));
             }
             self.counters.repeated_iterations += 1;
-            // It has stopped what came after it.
+            // The iteration submitted ahead has stopped as well.
             if let Some(begun) = self.ahead.take() {
                 all.add(self.device.finish(begun.ticket)?.run);
             }
@@ -111,9 +111,9 @@ impl Renderer {
         ))
     }
 
-    /// After an iteration that has to be done again: sizes that it needs, and what it gathered forgotten.
+    /// Before an iteration is repeated: sets the sizes that it needs and clears what it gathered.
     fn make_room(&mut self, status: &StatusCounters) -> Result<()> {
-        // Dealt anew, the lanes' photons are estimated anew.
+        // With more lanes, the number of photons per lane is estimated again.
         if status.again & LANES_TOO_LONG != 0 {
             self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
         } else if status.again & PHOTONS_DID_NOT_FIT != 0 {
@@ -135,7 +135,7 @@ impl Renderer {
         self.run(&recording).map(|_| ())
     }
 
-    /// Once photons have been traced, makes their buffers as large as those need. Their content is lost.
+    /// After the first photons, fits their buffers to the required size. Their content is lost.
     pub(super) fn fit_photon_buffers(&mut self) -> Result<()> {
         let [lane_need, batch_need] = self.photon_need;
         if self.fitted || batch_need == 0 {
@@ -146,8 +146,8 @@ impl Renderer {
         self.upload_settings()
     }
 
-    /// Does an iteration, unless `stop` cuts it short; where the caller will do another one before it asks for a picture, the
-    /// device may be given that one already.
+    /// Runs an iteration, unless `stop` interrupts it. With `another`, the caller runs another iteration before it requests a
+    /// picture, so that one may be submitted ahead.
     pub(super) fn do_iteration(&mut self, stop: &dyn Fn() -> bool, another: bool) -> Result<Option<Run>> {
         let iteration = self.totals.iterations;
         if self.ahead.is_none() {
@@ -168,7 +168,7 @@ impl Renderer {
         Ok(Some(run))
     }
 
-    /// Counts an iteration as done.
+    /// Adds a completed iteration to the totals.
     fn take_in(&mut self, iteration: u32, status: &StatusCounters, values: &[u32], added: Totals) {
         let before = self.reported.replace(*status).unwrap_or_else(StatusCounters::zeroed);
         count(&mut self.counters, &before, status);
@@ -176,7 +176,7 @@ impl Renderer {
         self.totals.add(added);
     }
 
-    /// Takes in what the device was given ahead, before anything else is done with what it has.
+    /// Completes the iteration that was submitted ahead, before anything else uses the device.
     pub(super) fn settle(&mut self) -> Result<()> {
         let Some(begun) = self.ahead.take() else { return Ok(()) };
         let iteration = self.totals.iterations;
@@ -188,7 +188,7 @@ impl Renderer {
         self.forget_gathered()
     }
 
-    /// Tries to do an iteration, of which the device may have been given everything.
+    /// Attempts an iteration, which may have been submitted ahead.
     fn attempt(&mut self, iteration: u32, stop: &dyn Fn() -> bool, another: bool, all: &mut Run) -> Result<Ended> {
         let begun = match self.ahead.take() {
             Some(begun) => begun,
@@ -199,19 +199,19 @@ impl Renderer {
             None => return self.batches(iteration, stop, all),
         };
         if another && self.may_begin(iteration + 1) {
-            // Its stages report on top of what those of this one do, and do nothing where this one has to be done again.
+            // Its stages add to the status of this iteration, and do nothing if this iteration has to be repeated.
             self.ahead = Some(self.begin_iteration(iteration + 1, Recording::new())?);
         }
         self.end_of(begun, all)
     }
 
-    /// Whether an iteration depends on nothing that the host does after the one before.
+    /// Whether an iteration is independent of the host's work after the previous one.
     fn may_begin(&self, iteration: u32) -> bool {
         let aims_anew = self.aim.is_some() && self.config.begins_sequences(iteration);
         self.iteration_ns <= MOST_AHEAD_NS && self.fitted && !aims_anew
     }
 
-    /// An empty recording, whose stages report on top of what the last iteration's did, or anew.
+    /// An empty recording, whose stages add to the status of the last iteration, or start a new one.
     fn beginning(&self) -> Recording {
         match self.reported {
             Some(_) => Recording::new(),
@@ -219,7 +219,7 @@ impl Renderer {
         }
     }
 
-    /// Gives the device an iteration of one batch.
+    /// Submits an iteration of one batch.
     fn begin_iteration(&mut self, iteration: u32, mut recording: Recording) -> Result<Begun> {
         let turn = CameraTurn::that_gathers(&self.config, iteration);
         let stages = self.stages();
@@ -229,7 +229,7 @@ impl Renderer {
         Ok(Begun { ticket, added })
     }
 
-    /// Gives the device an iteration's last commands, and what comes before them in the recording.
+    /// Submits an iteration's last commands, after those in the recording.
     fn submit_end(&mut self, turn: CameraTurn, paths: u32, mut recording: Recording) -> Result<(Ticket, Totals)> {
         self.stages().end(turn, paths, &mut recording);
         if self.aim.is_some() && is_learned_from(&self.config, turn.iteration) {
@@ -256,8 +256,8 @@ impl Renderer {
         Ok(ended)
     }
 
-    /// Runs an iteration, each batch of photons by itself: a device that is given minutes of work at once is taken for dead,
-    /// and nothing could stop it.
+    /// Runs an iteration, each batch of photons as a separate submission: drivers reset a device with minutes of work in one
+    /// submission, and nothing could interrupt it.
     fn batches(&mut self, iteration: u32, stop: &dyn Fn() -> bool, all: &mut Run) -> Result<Ended> {
         let photons = self.config.photons;
         let batches = self.sizes.batches(photons);
@@ -287,7 +287,7 @@ impl Renderer {
                     return Ok(ended);
                 }
                 paths = (batch + 1) * self.sizes.batch_paths;
-                // More camera paths could take longer than what was cut.
+                // More camera paths could take longer than the interrupted rest.
                 turn.paths = 1;
                 break;
             }

@@ -1,4 +1,4 @@
-//! What a render takes of a device: how much memory, known before any of it is taken, and within which limits.
+//! Device memory and limits of a render, known before any memory is allocated.
 
 use std::collections::BTreeSet;
 
@@ -10,20 +10,20 @@ use crate::packing::PackedScene;
 use crate::sizes::{Limits, Sizes, clustered_run};
 use crate::stage::BufferId;
 
-/// Bytes of a device's memory.
+/// Device memory, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Memory {
     /// For the scene.
     pub scene: u64,
     /// For visible points, photons and the rest of a render.
     pub render: u64,
-    /// Of that, what a map of caustic photons takes; 0 where the scene has neither mirrors nor glass.
+    /// Share of the caustic photon map in that; 0 if the scene has neither mirrors nor glass.
     pub caustic_map: u64,
 }
 
 impl Memory {
-    /// What a render on a device like this begins with. Later the photons' buffers are fitted to the photons that there
-    /// are, which are fewer as a rule.
+    /// The initial memory of a render on a device like this. Later the photon buffers are fitted to the photons, of which there
+    /// are usually fewer.
     pub fn of(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary) -> Self {
         let sizes = Sizes::new(config, limits(device, u32::MAX, scene));
         let stages = Stages {
@@ -55,13 +55,13 @@ impl Memory {
     }
 }
 
-/// Loop iterations that photon paths of a lane may make together where the driver has a limit: a subgroup's lanes share
-/// it on the driver that has one, and an inner loop runs as long as its slowest lane.
+/// Maximum number of loop iterations of a lane's photon paths together, if the driver has a limit: on that driver the invocations
+/// of a subgroup share the limit, and an inner loop runs as long as the slowest invocation.
 fn loop_budget(limit: u32) -> u32 {
     if limit == u32::MAX { limit } else { limit / 4 }
 }
 
-/// Bytes that a buffer can have and a stage can see of it, as words or as texels.
+/// Maximum size of a buffer that can be allocated and bound, as words or as texels.
 pub(super) fn bindable_bytes(device: &DeviceSummary) -> u64 {
     device
         .max_storage_buffer_bytes
@@ -69,7 +69,7 @@ pub(super) fn bindable_bytes(device: &DeviceSummary) -> u64 {
         .min(device.max_allocation_bytes)
 }
 
-/// What the sizes of a render of a scene depend on.
+/// The parameters of a render's sizes that depend on device and scene.
 pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScene) -> Limits {
     Limits {
         storage_buffer_bytes: bindable_bytes(device),
@@ -84,7 +84,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
     }
 }
 
-/// The buffers that hold the scene, of which the paper's triangles are only there to be bound where no ray is tested with them.
+/// The buffers of the scene. The paper's precomputed triangles are a placeholder unless its triangle test is used.
 pub(super) fn scene_buffers(scene: &PackedScene, test: TriangleTest) -> [(BufferId, &[u8]); 14] {
     let havel = match test {
         TriangleTest::Havel => scene.havel_triangles.len(),

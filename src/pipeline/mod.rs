@@ -43,17 +43,17 @@ pub struct Renderer {
     photon_flux: Option<f64>,
     totals: Totals,
     counters: Counters,
-    /// Photons that a lane needs room for at the most, and a batch.
+    /// Maximum number of photons of a lane, and of a batch, so far.
     photon_need: [u32; 2],
-    /// Whether the photons' buffers fit what photons need.
+    /// Whether the photon buffers have been fitted.
     fitted: bool,
-    /// Of photon paths, if they are aimed.
+    /// State of aimed photon paths.
     aim: Option<Aim>,
-    /// Launches that a gather outside a render is dealt to, for each of [`METHODS`].
+    /// Number of launches of a gather outside of a render, for each of [`METHODS`].
     parts_of_methods: Vec<u32>,
-    /// What the status said after the last iteration, where nothing else has been run since.
+    /// The status after the last iteration, if nothing else has run since.
     reported: Option<StatusCounters>,
-    /// An iteration that the device was given ahead of its turn.
+    /// An iteration that was submitted ahead.
     ahead: Option<Begun>,
     /// Nanoseconds that the last iteration's launches took.
     iteration_ns: f64,
@@ -69,8 +69,8 @@ impl Renderer {
         Self::within(bindable, device, scene, camera, config)
     }
 
-    /// As [`Renderer::new`], with photon buffers of no more than `buffer_bytes` each: an iteration that needs more is done
-    /// in batches.
+    /// As [`Renderer::new`], with photon buffers of at most `buffer_bytes` each: an iteration that needs more is split into
+    /// batches.
     ///
     /// # Errors
     /// As [`Renderer::new`].
@@ -138,7 +138,7 @@ impl Renderer {
             iteration_ns: f64::INFINITY,
         };
         renderer.upload_settings()?;
-        // Before any work: memory that lacks is told now and not after an hour.
+        // Before any work: fail early on insufficient memory.
         let stages = renderer.stages();
         let (iteration, picture) = (stages.shortest_iteration(), stages.picture(Totals::default()));
         renderer.make_buffers(&iteration)?;
@@ -155,8 +155,7 @@ impl Renderer {
         }
     }
 
-    /// Finds the first visible points and traces a batch of the first photons, for gathers to be tried on. Returns what
-    /// it took.
+    /// Finds the first visible points and traces the first batch of photons, as input for benches of gathers. Returns the time.
     ///
     /// # Errors
     /// As [`Backend::iterate`].
@@ -173,7 +172,7 @@ impl Renderer {
         Ok(run)
     }
 
-    /// Makes the picture so far; returns what that took as well.
+    /// Makes the picture so far; also returns the time.
     ///
     /// # Errors
     /// As [`Backend::resolve`].
@@ -193,8 +192,7 @@ impl Renderer {
         Ok((run, resolved))
     }
 
-    /// Gathers the photons at hand with any method of a device; what was gathered before is forgotten. Returns what it
-    /// took, and what it reported.
+    /// Gathers the current photons with any method of a device; earlier sums are cleared. Returns the time and the status.
     ///
     /// # Errors
     /// As [`Backend::iterate`].
@@ -216,7 +214,7 @@ impl Renderer {
         result
     }
 
-    /// Whether photons that no visible point wants are dropped.
+    /// Whether photons that no visible point can accept are dropped.
     pub fn drops_unwanted(&self) -> bool {
         self.config.drops_unwanted()
     }
@@ -231,7 +229,7 @@ impl Renderer {
         &mut self.device
     }
 
-    /// Tells the kernels the buffers' sizes.
+    /// Uploads the settings, with the buffers' sizes.
     fn upload_settings(&mut self) -> Result<()> {
         let sizes = &self.sizes;
         self.settings.photon_lanes = sizes.photon_lanes;
@@ -243,7 +241,7 @@ impl Renderer {
         self.device.upload(BufferId::Settings, &[self.settings])
     }
 
-    /// Makes the buffers that a recording touches, where they aren't there or of another size.
+    /// Allocates the buffers that a recording uses, if they are missing or of another size.
     fn make_buffers(&mut self, recording: &Recording) -> Result<()> {
         for id in recording.buffers() {
             if let Some(bytes) = self.sizes.bytes(id)
@@ -255,7 +253,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Runs a recording on the device, after making the buffers that it needs.
+    /// Runs a recording on the device, after allocating the buffers that it needs.
     ///
     /// # Errors
     /// A device without enough memory, or a failed Vulkan call.
@@ -266,7 +264,7 @@ impl Renderer {
     }
 }
 
-/// How rays meet triangles on a device.
+/// How rays are traced on a device.
 fn accel_on(config: &RenderConfig, device: &DeviceSummary) -> Result<Accel> {
     let is_gpu = ["discrete", "integrated", "virtual"].contains(&device.kind);
     match config.accel {

@@ -1,4 +1,4 @@
-//! What is found before the first iteration: visible points, where to aim photon paths, radii.
+//! Preparation of the first iteration: visible points, aiming of photon paths, radii.
 
 use super::Renderer;
 use super::stages::reporting;
@@ -12,9 +12,9 @@ use crate::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
 use crate::{radius, shaders};
 
 impl Renderer {
-    /// Finds the first visible points, aims photon paths at what discs of a pilot want, and finds the radii: the
-    /// user's, or first ones from the density of pilot photons, one that suits the median visible point, then smaller ones
-    /// where the photons are denser. Resets the statistics.
+    /// Finds the first visible points, aims photon paths at the demand of pilot discs, and finds the radii: the user's, or
+    /// initial radii from the density of pilot photons, first for the median visible point, then smaller ones where photons are
+    /// denser. Resets the statistics.
     pub(super) fn prepare(&mut self, scene: &PackedScene) -> Result<()> {
         self.reset()?;
         self.run_until_it_fits(|stages| {
@@ -46,7 +46,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// First radii from the pilot photons at hand.
+    /// Initial radii from the current pilot photons.
     fn fit_radii(&mut self) -> Result<()> {
         let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
         let footprints: Vec<f32> = self.device.download(BufferId::Footprints, None)?;
@@ -78,7 +78,7 @@ impl Renderer {
             radius::sharpen(self.config.resolution, &footprints, caustic);
             self.device.upload(BufferId::StatisticsOf, &statistics)?;
         }
-        // A radius that was too large where photons are dense says nothing of later gathers.
+        // A launch count from radii that were too large does not apply to later gathers.
         self.sizes.gather_parts = 1;
         Ok(())
     }

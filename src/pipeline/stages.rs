@@ -1,4 +1,4 @@
-//! What an iteration runs, as data.
+//! The stages of an iteration, as data.
 
 use std::ops::Range;
 
@@ -11,18 +11,18 @@ use crate::shaders;
 use crate::sizes::Sizes;
 use crate::stage::{BufferId, RAY_QUERY, SEQUENCE_FILMS, SEQUENCE_SUMS, Shader, StageDesc};
 
-/// The stages of a render, as data: what an iteration runs, without a device.
+/// The stages of a render, as data, without a device.
 #[derive(Clone, Copy)]
 pub struct Stages<'a> {
     /// The render's settings.
     pub config: &'a RenderConfig,
     /// Its buffers' sizes.
     pub sizes: &'a Sizes,
-    /// What its scene has.
+    /// Its scene's features.
     pub features: SceneFeatures,
 }
 
-/// The stages of a gather method that [`super::Renderer::new`] has let pass.
+/// The stages of a gather method that [`super::Renderer::new`] has accepted.
 pub(super) fn method_stages(method: usize) -> (Record, Record) {
     let nothing: Record = |_, _| ();
     METHODS[method].stages().unwrap_or((nothing, nothing))
@@ -33,7 +33,7 @@ fn sums_of(iteration: u32) -> (BufferId, BufferId) {
     (BufferId::SequenceSums, SEQUENCE_SUMS[(iteration % SEQUENCES) as usize])
 }
 
-/// A recording whose stages report into a status of their own.
+/// A recording that clears the status first.
 pub(super) fn reporting() -> Recording {
     let mut recording = Recording::new();
     recording.fill(BufferId::Status, 0);
@@ -53,7 +53,7 @@ impl Stages<'_> {
         recording
     }
 
-    /// The commands of an iteration of one batch: they touch the buffers that one of any number does.
+    /// The commands of an iteration of one batch: they use the same buffers as several batches.
     pub fn shortest_iteration(&self) -> Recording {
         let mut recording = reporting();
         self.begin(0, &mut recording);
@@ -63,7 +63,7 @@ impl Stages<'_> {
         recording
     }
 
-    /// What comes before an iteration's photons.
+    /// The stages before an iteration's photons.
     pub(super) fn begin(&self, iteration: u32, recording: &mut Recording) {
         let (order, _) = self.method();
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
@@ -82,7 +82,7 @@ impl Stages<'_> {
         gather(self.sizes, recording);
     }
 
-    /// What comes after an iteration's photons, of so many paths.
+    /// The stages after an iteration's photons; `photons` is the number of paths.
     pub(super) fn end(&self, turn: CameraTurn, photons: u32, recording: &mut Recording) {
         let iteration = turn.iteration;
         let asks = self.features.dielectric && self.config.asks_behind_glass(iteration);
@@ -99,14 +99,14 @@ impl Stages<'_> {
                 .push([photons as f32])
                 .bind(vec![sums_of(iteration)]),
         );
-        // After the photons: an iteration that has to be done again stops before it has added anything.
+        // After the photons, because an iteration that has to be repeated must stop before it adds anything.
         for turn in turn.others() {
             self.camera(turn, recording);
             self.direct(turn, false, recording);
         }
     }
 
-    /// The commands that make the picture of what was rendered.
+    /// The commands that make the picture.
     pub fn film(&self, totals: Totals) -> Recording {
         let mut recording = reporting();
         let Totals {
@@ -133,12 +133,12 @@ impl Stages<'_> {
         recording
     }
 
-    /// What the gather method records for new visible points, and for a batch of photons.
+    /// The gather method's functions that record stages for new visible points, and for a batch of photons.
     pub(super) fn method(&self) -> (Record, Record) {
         method_stages(self.config.gather.unwrap_or_else(default_method))
     }
 
-    /// Finding the visible points: in an iteration with this one of so many paths of each pixel.
+    /// Finds visible points, by one of the camera paths of each pixel.
     pub(super) fn camera(&self, turn: CameraTurn, recording: &mut Recording) {
         recording.dispatch(
             self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots)
@@ -146,7 +146,7 @@ impl Stages<'_> {
         );
     }
 
-    /// What they see of the lights, and whether they ask for lights behind glass.
+    /// Direct light at the visible points. `asks`: whether light behind glass is estimated.
     fn direct(&self, turn: CameraTurn, asks: bool, recording: &mut Recording) {
         recording.dispatch(
             self.ray_stage(&shaders::DIRECT, self.sizes.slots())
@@ -156,13 +156,13 @@ impl Stages<'_> {
         );
     }
 
-    /// The radii that the visible points gather within, and the grids that suit them.
+    /// The radii of the visible points, and grids of suitable cell sizes.
     pub(super) fn radii(&self, recording: &mut Recording) {
         recording.dispatch(StageDesc::new(&shaders::RADII, self.sizes.receivers()));
         grid_sizes(self.sizes, recording);
     }
 
-    /// What visible points want of photons, after so many iterations. The paper keeps all photons.
+    /// The demand of the visible points, after this number of iterations. The paper keeps all photons.
     pub(super) fn demand(&self, iterations: u32, recording: &mut Recording) {
         if self.config.drops_unwanted() {
             let emitted = u64::from(iterations) * u64::from(self.config.photons);
@@ -172,7 +172,7 @@ impl Stages<'_> {
         }
     }
 
-    /// Photon tracing of a batch, and moving its photons together.
+    /// Traces the photons of a batch, and joins the regions of lanes.
     pub(super) fn photons(&self, iteration: u32, batch: u32, recording: &mut Recording) {
         let first = batch * self.sizes.batch_paths;
         let paths = self.sizes.batch_paths.min(self.config.photons - first);
@@ -181,7 +181,7 @@ impl Stages<'_> {
         recording.dispatch(StageDesc::new(&shaders::COMPACT, self.sizes.lane_photons()));
     }
 
-    /// Photon tracing alone, of so many paths of an iteration.
+    /// Traces a range of paths of an iteration.
     pub(super) fn trace_paths(&self, iteration: u32, paths: Range<u32>, recording: &mut Recording) {
         let lanes = self.sizes.photon_lanes;
         let push = [

@@ -1,4 +1,4 @@
-//! Rendering as a library's user sees it: a scene in, pictures out.
+//! The public interface for rendering: a scene in, pictures out.
 
 mod prepared;
 mod rendered;
@@ -25,12 +25,12 @@ use crate::scene::Camera;
 use crate::{cpu, pipeline};
 use work::Work;
 
-/// What a render runs on.
+/// The platform of a render.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Platform {
     /// A Vulkan device: the one of this index or with this in its name, or the best one.
     Vulkan(Option<String>),
-    /// The processor, without Vulkan: slow, and what the kernels are tested against.
+    /// The CPU, without Vulkan: a plain, slow renderer, which the kernels are tested against.
     Cpu,
 }
 
@@ -40,13 +40,13 @@ impl Default for Platform {
     }
 }
 
-/// What a program may say and ask while it waits for [`Session::render_with`].
+/// Callbacks of [`Session::render_with`].
 pub struct Hooks<'a> {
-    /// Asked between batches of photon paths: whether to stop early, with the picture so far.
+    /// Called between batches of photon paths: whether to stop early, with the picture so far.
     pub stop: &'a dyn Fn() -> bool,
-    /// Told after every iteration.
+    /// Called after every iteration.
     pub progress: &'a dyn Fn(Progress),
-    /// Whether [`Rendered::profile`] has the launches: those of a day are gigabytes.
+    /// Whether [`Rendered::profile`] collects launches: those of a day take gigabytes.
     pub profile: bool,
 }
 
@@ -65,7 +65,7 @@ enum Renderer {
     Cpu(Box<cpu::Renderer>),
 }
 
-/// A progressive render of a scene, which goes on for as long as it is asked to.
+/// A progressive render of a scene, which can be continued.
 ///
 /// ```no_run
 /// use ppm_vk::{Platform, PreparedScene, RenderConfig, Scene, Session, Until};
@@ -135,12 +135,12 @@ impl Session {
     /// Renders until a limit is reached.
     ///
     /// # Errors
-    /// What failed before there was a picture. Later failures are in [`Rendered::failure`].
+    /// Any failure before the first picture. Later failures are in [`Rendered::failure`].
     pub fn render(&mut self, until: Until) -> Result<Rendered> {
         self.render_with(until, &Hooks::default())
     }
 
-    /// The same, by a program that shows how far it is or may stop it early. It can be called again, to go on.
+    /// The same with callbacks, which can show progress or stop early. It can be called again, to continue.
     ///
     /// # Errors
     /// As [`Session::render`].
@@ -155,8 +155,9 @@ impl Session {
         Ok(Rendered::new(self, done))
     }
 
-    /// Does one iteration, and returns what its launches took. Less than [`Session::render`] does: nothing is kept for the case
-    /// that the next one fails. `None`: `stop`, which is asked between batches of photon paths, ended it early, and it is left out.
+    /// Runs one iteration, and returns the times of its launches. Unlike [`Session::render`], it keeps no picture for the case
+    /// that the next iteration fails. `None`: `stop`, which is called between batches of photon paths, ended it early, and it is
+    /// left out.
     ///
     /// # Errors
     /// Whatever the device can't do.
@@ -167,7 +168,7 @@ impl Session {
         run
     }
 
-    /// The picture so far, and its error, where that can be told.
+    /// The picture so far, and its estimated error, if known.
     ///
     /// # Errors
     /// Whatever the device can't do.
@@ -182,7 +183,7 @@ impl Session {
         self.renderer.backend().iterations()
     }
 
-    /// What it runs on.
+    /// The device that it runs on.
     pub fn device(&self) -> DeviceDescription {
         self.renderer.backend().device()
     }
@@ -192,7 +193,7 @@ impl Session {
         f64::from(self.renderer.backend().radius()) / self.scale
     }
 
-    /// Whether photon paths are aimed. They aren't where it was found not to be worth its cost, whatever the settings are.
+    /// Whether photon paths are aimed. They are not if the pilot rounds found that aiming does not pay for its cost.
     pub fn is_aimed(&self) -> bool {
         self.renderer.backend().aims()
     }
@@ -202,7 +203,7 @@ impl Session {
         &self.config
     }
 
-    /// What is to be known before it begins.
+    /// Warnings before the render begins.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }

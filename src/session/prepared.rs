@@ -9,7 +9,7 @@ use crate::packing::PackedScene;
 use crate::pipeline::Memory;
 use crate::scene::Scene;
 
-/// A scene with a hierarchy of its triangles, as any number of sessions read it.
+/// A scene with a hierarchy of its triangles, for any number of sessions.
 #[derive(Debug, Clone)]
 pub struct PreparedScene {
     name: String,
@@ -34,7 +34,7 @@ impl PreparedScene {
         &self.name
     }
 
-    /// What a user should know of it, beside [`Scene::notes`].
+    /// Remarks for the user, in addition to [`Scene::notes`].
     pub fn notes(&self) -> &[String] {
         &self.packed.notes
     }
@@ -44,17 +44,17 @@ impl PreparedScene {
         self.packed.features.names()
     }
 
-    /// Triangles that can be seen: those of an object count as often as it is there.
+    /// Number of visible triangles: those of an instance count once for each instance.
     pub fn triangles(&self) -> u64 {
         self.packed.seen_triangles()
     }
 
-    /// What a render takes of a device's memory.
+    /// The device memory that a render takes.
     pub fn memory(&self, config: &RenderConfig, device: &DeviceSummary) -> Memory {
         Memory::of(&self.packed, config, device)
     }
 
-    /// As the device has it.
+    /// In the device's layout.
     #[doc(hidden)]
     pub fn packed(&self) -> &PackedScene {
         &self.packed

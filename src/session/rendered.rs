@@ -1,4 +1,4 @@
-//! What a session has rendered.
+//! The result of a render.
 
 use std::fmt;
 use std::path::Path;
@@ -11,14 +11,14 @@ use crate::estimate::{ErrorEstimate, RelativeError};
 use crate::film::{self, Image, Layers, Metadata};
 use crate::report::{Profile, Subject};
 
-/// What ended a render too early.
+/// The failure that ended a render early.
 #[derive(Debug)]
 pub struct Failure {
-    /// What failed.
+    /// The error.
     pub error: Error,
-    /// In which iteration, from 1 on.
+    /// The iteration that failed, counted from 1.
     pub iteration: u32,
-    /// The picture is that of so many iterations before.
+    /// Number of iterations in the picture.
     pub kept: u32,
 }
 
@@ -32,7 +32,7 @@ impl fmt::Display for Failure {
     }
 }
 
-/// A picture with what is known of it.
+/// A picture with its errors, warnings and profile.
 pub struct Rendered {
     picture: Resolved,
     metadata: Metadata,
@@ -96,7 +96,7 @@ impl Rendered {
         self.metadata.seconds
     }
 
-    /// Its estimated error; `None` after fewer than four iterations, and where it is black.
+    /// Its estimated error; `None` after fewer than four iterations, and if it is black.
     pub fn error(&self) -> Option<RelativeError> {
         self.error
     }
@@ -106,7 +106,7 @@ impl Rendered {
         self.estimate.of_pixels(self.iterations(), &self.picture)
     }
 
-    /// What it lacks.
+    /// Warnings about the picture.
     pub fn warnings(&self) -> Vec<Warning> {
         let Subject {
             counters,
@@ -120,22 +120,22 @@ impl Rendered {
         warnings
     }
 
-    /// What ended it too early.
+    /// The failure that ended it early.
     pub fn failure(&self) -> Option<&Failure> {
         self.failure.as_ref()
     }
 
-    /// What it was, with what happened besides the picture.
+    /// The subject of its profile, with counters.
     pub fn subject(&self) -> &Subject {
         &self.subject
     }
 
-    /// Every launch of the call that it is from, if [`Hooks::profile`](super::Hooks::profile) asked for them.
+    /// Every launch of the render call, if [`Hooks::profile`](super::Hooks::profile) is set.
     pub fn profile(&self) -> &Profile {
         &self.profile
     }
 
-    /// Writes an OpenEXR file: linear RGB, alpha, the error of each pixel, and how it was made as attributes.
+    /// Writes an OpenEXR file: linear RGB, alpha, the error of each pixel, and render metadata as attributes.
     ///
     /// # Errors
     /// A path that can't be written to, a full disk. The file is whole or absent.
@@ -148,7 +148,7 @@ impl Rendered {
         film::write_exr(self.image(), layers, path, &self.metadata)
     }
 
-    /// Writes a tone-mapped PNG, with so many stops more of light.
+    /// Writes a tone-mapped PNG, with an exposure in stops.
     ///
     /// # Errors
     /// As [`Rendered::write_exr`].

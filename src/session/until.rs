@@ -1,23 +1,23 @@
-//! When a render ends, and how far it is.
+//! Limits and progress of a render.
 
 use std::time::Duration;
 
-/// Iterations from which an estimated error may end a render: fewer have too little to tell it from.
+/// Minimum number of iterations before an estimated error may end a render: with fewer, the estimate is unreliable.
 const TRUSTED_FROM: u32 = 16;
 
-/// When a render ends: at the first limit that is reached. Without any it goes on until it is stopped.
+/// The limits of a render: it ends at the first one that is reached. Without limits it continues until it is stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Until {
-    /// After so many iterations of the session.
+    /// Number of iterations of the session.
     pub iterations: Option<u32>,
-    /// After so much time.
+    /// Rendering time.
     pub time: Option<Duration>,
     /// When the estimated relative error is no larger than this, from iteration 16 on.
     pub error: Option<f64>,
 }
 
 impl Until {
-    /// Until the session has had so many iterations.
+    /// Until the session has done this number of iterations.
     pub fn iterations(count: u32) -> Self {
         Self {
             iterations: Some(count),
@@ -25,7 +25,7 @@ impl Until {
         }
     }
 
-    /// For so long.
+    /// For this time.
     pub fn time(time: Duration) -> Self {
         Self {
             time: Some(time),
@@ -41,7 +41,7 @@ impl Until {
         }
     }
 
-    /// The part of the render that is done, 0 to 1. `error` is the estimated relative error, where there is one.
+    /// The share of the render that is done, 0 to 1. `error` is the estimated relative error, if known.
     pub(super) fn done(&self, iterations: u32, elapsed: Duration, error: Option<f64>) -> f64 {
         let by_iterations = self
             .iterations
@@ -59,15 +59,15 @@ impl Until {
     }
 }
 
-/// How far a render is.
+/// The progress of a render.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// Iterations of the session.
     pub iterations: u32,
     /// Photon paths emitted in them.
     pub photons_emitted: u64,
-    /// The estimated relative error, where there is one.
+    /// The estimated relative error, if known.
     pub error: Option<f64>,
-    /// The part of the render that is done, 0 to 1; 0 where nothing but the user ends it.
+    /// The share of the render that is done, 0 to 1; 0 if there are no limits.
     pub done: f64,
 }

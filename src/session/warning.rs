@@ -1,4 +1,4 @@
-//! What a picture lacks, and how much that is.
+//! Warnings about a picture.
 
 use std::fmt;
 
@@ -6,16 +6,16 @@ use crate::backend::Counters;
 use crate::config::{Estimator, RenderConfig};
 use crate::packing::SceneFeatures;
 
-/// The share of the light from which on its lack is a warning: no eye sees less.
+/// Minimum share of missing light for a warning: less is invisible.
 const TELLING_SHARE: f64 = 0.001;
 
-/// What a picture lacks, in a line. It names no program's flags: those follow from its kind.
+/// A defect of a picture, as one line. It names no flags of a program: those follow from its kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
-    /// The estimator of the paper keeps the first choice of what is chosen by chance: grain that stays.
+    /// The paper's estimator keeps the first of all random choices: permanent grain.
     KeptChoices,
-    /// Caustics have the radii of other light: a picture that large has one photon map.
+    /// Caustics have the radii of other light: a picture of this size has one photon map.
     OneMap,
     /// Paths reached [`RenderConfig::max_depth`].
     Truncated {
@@ -52,7 +52,7 @@ pub enum Warning {
 }
 
 impl Warning {
-    /// Of a render that is about to begin.
+    /// Warnings about a render before it begins.
     pub(super) fn before(features: &SceneFeatures, config: &RenderConfig, photon_maps: u32) -> Vec<Self> {
         let chooses = features.dispersion || features.alpha || features.partly_clear || features.coat || features.soft;
         let specular = features.mirror || features.dielectric;
@@ -64,7 +64,7 @@ impl Warning {
         warnings.into_iter().flatten().collect()
     }
 
-    /// Of what happened in a render of so many photon paths.
+    /// Warnings from the counters of a render, with its number of photon paths.
     pub fn of(counters: &Counters, emitted: u64, max_depth: u32) -> Vec<Self> {
         let warnings = [
             (counters.truncated_paths > 0).then_some(Self::Truncated {
@@ -88,12 +88,12 @@ impl Warning {
         warnings.into_iter().flatten().collect()
     }
 
-    /// Whether hardly anything of the picture is missing.
+    /// Whether the missing share of the picture is negligible.
     pub fn is_slight(&self) -> bool {
         match self {
             Self::OneMap => true,
-            // From bounce to bounce about the same share goes on, so that the paths that were cut had about as much before them as
-            // all had at their start: as if all were photon paths, that is their share of the light.
+            // About the same share of light continues at each bounce, so the truncated paths would carry about as much light as
+            // all paths at the start. So their share of the paths, as if all were photon paths, is their share of the light.
             Self::Truncated { paths, emitted, .. } => share(*paths, *emitted) < TELLING_SHARE,
             _ => false,
         }

@@ -8,21 +8,20 @@ use crate::error::{Error, Result};
 use crate::estimate::ErrorEstimate;
 use crate::report::Profile;
 
-/// A picture is kept, for the case that a later iteration loses the device, so often that this is the part of the time that it
-/// takes.
+/// A picture is kept for the case that a later iteration loses the device. This is the share of time that making it may take.
 const KEEPING: f64 = 0.01;
 
-/// What there is to be done.
+/// The parameters of the work.
 pub struct Work<'a> {
-    /// When it ends.
+    /// Limits.
     pub until: Until,
-    /// How its error is told.
+    /// Estimator of its error.
     pub estimate: ErrorEstimate,
-    /// Who waits for it.
+    /// Callbacks of the caller.
     pub hooks: &'a Hooks<'a>,
 }
 
-/// What was rendered.
+/// The result.
 pub struct Done {
     /// The picture.
     pub picture: Resolved,
@@ -32,15 +31,15 @@ pub struct Done {
     pub emitted: u64,
     /// Seconds that it took.
     pub seconds: f64,
-    /// Time until the end, with iterations that aren't in it.
+    /// Total time, including iterations that are not in the picture.
     pub time: Duration,
     /// Launches of all iterations.
     pub profile: Profile,
-    /// What ended the render too early.
+    /// The failure that ended the render early.
     pub failure: Option<Failure>,
 }
 
-/// A picture on the way.
+/// An intermediate picture.
 struct Kept {
     picture: Resolved,
     iterations: u32,
@@ -48,7 +47,7 @@ struct Kept {
     /// Rendering time in seconds.
     seconds: f64,
     at: Instant,
-    /// Time that it took to be made.
+    /// Time that making it took.
     cost: Duration,
 }
 
@@ -76,7 +75,7 @@ impl Work<'_> {
     /// Renders.
     ///
     /// # Errors
-    /// What failed before there was a picture. Later failures are told beside the picture of the iterations before.
+    /// Any failure before the first picture. Later failures are returned with the picture of the iterations before.
     pub fn run(&self, backend: &mut dyn Backend) -> Result<Done> {
         let start = Instant::now();
         let asked = self.hooks.stop;
@@ -87,7 +86,7 @@ impl Work<'_> {
         let mut error = None;
         let mut failure = None;
         let mut has_begun = false;
-        // However short the time, there is a picture; and what the device was given ahead is waited for.
+        // There is always a picture, however short the time; iterations that were submitted ahead are completed.
         while backend.iterations() == 0 || has_begun || !(asked() || done(backend, error) >= 1.0) {
             let began = start.elapsed();
             let next = backend.iterations() + 1;
