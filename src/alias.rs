@@ -1,24 +1,24 @@
 //! The alias method: Vose, «A Linear Algorithm For Generating Random Numbers With a Given Distribution», IEEE Transactions
 //! on Software Engineering 17(9), 1991. `glsl/lights/alias_table.glsl` chooses in the same way.
 
-/// A cell of the table, which has as many as there are things to choose among.
+/// A cell of the table, which has one cell for each item.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AliasCell {
-    /// The part of the cell that chooses the thing of its number.
+    /// The part of the cell that chooses the cell's own index.
     pub accept: f32,
-    /// What the rest of it chooses.
+    /// The index that the rest of it chooses.
     pub alias: u32,
 }
 
 /// The table for probabilities whose sum is 1.
 pub fn alias_table(probabilities: &[f64]) -> Vec<AliasCell> {
     let count = probabilities.len() as f64;
-    // How much of each is left to be put into cells, whose width is 1.
+    // The remainder of each probability to be put into cells, whose width is 1.
     let mut left: Vec<f64> = probabilities.iter().map(|probability| probability * count).collect();
     let own = |alias| AliasCell { accept: 1.0, alias };
     let mut cells: Vec<AliasCell> = (0..probabilities.len() as u32).map(own).collect();
     let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..left.len()).partition(|&i| left[i] < 1.0);
-    // What rounding leaves over fills its own cell.
+    // Remainders of rounding fill their own cells.
     while let (Some(&donor), Some(cell)) = (large.last(), small.pop()) {
         cells[cell] = AliasCell {
             accept: left[cell] as f32,
@@ -33,17 +33,17 @@ pub fn alias_table(probabilities: &[f64]) -> Vec<AliasCell> {
     cells
 }
 
-/// What was chosen, and what is left of the number that chose it, uniform in [0, 1].
+/// The chosen index, and the remainder of the number that chose it, uniform in [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Choice {
-    /// Which.
+    /// The index.
     pub index: usize,
-    /// The rest.
+    /// The remainder.
     pub rest: f64,
 }
 
-/// Chooses one of `count` things, whose cells `cell` gives, with the digits of `u` in [0, 1) and of two more numbers below it,
-/// multiples of 2⁻²⁴ each.
+/// Chooses one of `count` items, whose cells `cell` returns, with the digits of `u` in [0, 1) and of two lower numbers, multiples
+/// of 2⁻²⁴ each.
 pub fn choose(count: usize, u: f64, digits: [f64; 2], cell: impl Fn(usize) -> AliasCell) -> Choice {
     let [first, second, third] = [u, digits[0], digits[1]].map(|number| (number * f64::from(1 << 24)) as u64);
     // A fraction of 64 bits times the number of cells.

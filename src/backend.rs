@@ -1,4 +1,4 @@
-//! What a progressive renderer offers, whatever it runs on.
+//! The interface of progressive renderers, on a device or on the CPU.
 
 use crate::config::RenderConfig;
 #[cfg(doc)]
@@ -14,31 +14,31 @@ use crate::scene::Camera;
 use crate::scene::Lens;
 use crate::scene::Projection;
 
-/// A progressive render that is under way.
+/// A progressive render.
 pub trait Backend {
-    /// Does one iteration; returns what its stages took.
+    /// Runs one iteration; returns the times of its stages.
     ///
     /// # Errors
     /// Whatever the device can't do.
     fn iterate(&mut self) -> Result<Run> {
         self.iterate_unless(&|| false).map(Option::unwrap_or_default)
     }
-    /// The same, unless `stop`, which is asked between batches of photon paths, says that there is no time for the rest. An
-    /// iteration that is cut short is left out of the picture, and there is none to be returned; but the first one ends with
-    /// the paths that it has emitted by then, so that there is a picture.
+    /// The same, unless `stop`, which is called between batches of photon paths, interrupts it. An interrupted iteration is left
+    /// out of the picture, and `None` is returned; but the first one ends with the paths that it has emitted, so that there is a
+    /// picture.
     ///
     /// # Errors
     /// As [`Backend::iterate`].
     fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>>;
-    /// The same, of a caller that will do another iteration before it asks for anything else: it may be begun already, so that
-    /// the device doesn't wait for the host.
+    /// The same for a caller that runs another iteration before any other request: that one may be submitted ahead, so that the
+    /// device does not wait for the host.
     ///
     /// # Errors
     /// As [`Backend::iterate`].
     fn iterate_before_another(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
         self.iterate_unless(stop)
     }
-    /// The picture so far (eq. 4), and what tells its bias.
+    /// The picture so far (equation 4), and the data for its error.
     ///
     /// # Errors
     /// Whatever the device can't do.
@@ -54,39 +54,39 @@ pub trait Backend {
     fn iterations(&self) -> u32;
     /// Photon paths emitted in all iterations.
     fn emitted(&self) -> u64;
-    /// What happened besides the picture.
+    /// Counters of the render.
     fn counters(&self) -> Counters;
     /// The median of the initial radii of global photons, render units.
     fn radius(&self) -> f32;
-    /// Mean flux of the photons that visible points wanted before the first iteration, not divided by the emitted paths; `None`
-    /// where there were none.
+    /// Mean flux of the photons that visible points accepted before the first iteration, not divided by the emitted paths; `None`
+    /// if there were none.
     fn photon_flux(&self) -> Option<f64>;
     /// Whether photon paths are aimed.
     fn aims(&self) -> bool;
-    /// Photon maps: 2 where caustic photons are gathered apart from the others.
+    /// Number of photon maps: 2 if caustic photons have one of their own.
     fn photon_maps(&self) -> u32;
-    /// What it runs on.
+    /// The device that it runs on.
     fn device(&self) -> DeviceDescription;
 }
 
-/// A picture, and what tells its error.
+/// A picture, and the data for its error.
 #[derive(Debug, Clone)]
 pub struct Resolved {
     /// The picture.
     pub image: Image,
-    /// Of each pixel, the share of the camera paths that met a surface.
+    /// For each pixel, the share of the camera paths that met a surface.
     pub alpha: Vec<f32>,
-    /// Whether no photon has come yet to a pixel's surface, which isn't in the open.
+    /// Whether a pixel's surface, which is not in the open, has received no photon yet.
     pub waits: Vec<bool>,
-    /// Of each pixel, what tells whether it has its part of the light behind glass.
+    /// For each pixel, the data for the missing light behind glass.
     pub behind_glass: Vec<BehindGlass>,
     /// RGB and curvature of each pixel by the iterations of each of [`SEQUENCES`] alone: one picture after another.
     pub sequences: Vec<[f32; 4]>,
 }
 
 impl Resolved {
-    /// From a renderer's films, in rows from the top left: RGB and alpha, negative where a pixel waits; what tells of light behind
-    /// glass, and the sequences' pictures.
+    /// From a renderer's films, in rows from the top left: RGB and alpha, negative if a pixel waits for its first photon; the
+    /// data for light behind glass; the pictures of the sequences.
     pub fn from_film(
         resolution: [u32; 2],
         film: &[[f32; 4]],
@@ -103,7 +103,7 @@ impl Resolved {
     }
 }
 
-/// What a render runs on, for reports.
+/// The device of a render, for reports.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct DeviceDescription {
     /// Name.
@@ -114,14 +114,14 @@ pub struct DeviceDescription {
     pub timestamp_period_ns: f32,
 }
 
-/// What happened in a render besides its picture.
+/// Counters of a render.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
-    /// Photons that landed where visible points could be, in all iterations.
+    /// Photons that landed on surfaces that can have visible points, in all iterations.
     pub photons_landed: u64,
-    /// Those of them that a visible point might accept, and that were stored.
+    /// Those that a visible point might accept, and that were stored.
     pub photons_stored: u64,
-    /// Photons that visible points had accepted when the picture was last made, as often as one did.
+    /// Photons accepted by visible points when the picture was last made, counted once per visible point.
     pub photons_accepted: u64,
     /// Paths that the bounce limit ended.
     pub truncated_paths: u64,
@@ -129,16 +129,16 @@ pub struct Counters {
     pub cut_paths: u64,
     /// Values that were NaN or infinite and were left out.
     pub non_finite: u64,
-    /// Photons beyond the maximum of a grid cell, which weren't gathered.
+    /// Photons beyond the maximum of a grid cell, which were not gathered.
     pub lost_photons: u64,
     /// Grid cells that had more photons than their maximum, in all iterations.
     pub full_cells: u64,
-    /// Iterations done again because photons didn't fit or the driver cut loops short.
+    /// Iterations that were repeated because photons did not fit or the driver cut loops short.
     pub repeated_iterations: u64,
 }
 
 impl Counters {
-    /// What became of the photons, in words.
+    /// A summary of the photons, as text.
     pub fn photons(&self) -> String {
         let Self {
             photons_landed,
@@ -150,7 +150,7 @@ impl Counters {
     }
 }
 
-/// What relMSE has beside the squared radiance, of the picture so far; 1 of a black one. Photons are wanted by this measure.
+/// relMSE's denominator without the squared radiance, for the picture so far; 1 for a black one. Demand for photons uses it.
 pub fn demand_floor2(picture: &Image) -> f32 {
     let floor2 = metrics::floor_of(picture);
     if floor2 > 0.0 { floor2 as f32 } else { 1.0 }
@@ -160,7 +160,7 @@ pub fn demand_floor2(picture: &Image) -> f32 {
 const SMALLEST_RADIUS: f64 = 1e-12;
 const LARGEST_RADIUS: f64 = 1e6;
 
-/// What the stages read of the configuration, the scene and the camera; the buffers' sizes are left at 0.
+/// The kernels' settings from the configuration, the scene and the camera; buffer sizes remain 0.
 pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loop_limit: u32) -> Settings {
     let [width, height] = config.resolution;
     let (half_height, orthographic) = match camera.projection {
@@ -175,7 +175,7 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
     let [right, up] = [camera.right * half_width, camera.up * half_height];
     let larger = 2.0 * half_width.max(half_height);
     let shift = larger * (camera.shift.x * camera.right + camera.shift.y * camera.up);
-    // Rays of a perspective camera go through the film at distance 1; those of the other kind begin on it.
+    // Rays of a perspective camera pass the film at distance 1; those of an orthographic camera begin on it.
     let (position, forward) = if orthographic == 0.0 {
         (camera.position, camera.forward + shift)
     } else {

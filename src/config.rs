@@ -1,4 +1,4 @@
-//! What the user asked for.
+//! Settings of a render.
 
 mod choice;
 pub mod ranges;
@@ -63,7 +63,7 @@ choices! {
 choices! {
     /// How photon paths start.
     pub enum EmissionChoice {
-        /// Where paths were found to bring photons that the picture needs.
+        /// Where photons that the picture needs were found to start.
         Aimed => "aimed",
         /// In proportion to the lights' power, as in the paper.
         Power => "power",
@@ -71,7 +71,7 @@ choices! {
 }
 
 impl EmissionChoice {
-    /// What an estimator uses where the user doesn't say.
+    /// The default of an estimator.
     pub const fn of(estimator: Estimator) -> Self {
         match estimator {
             Estimator::Sppm => Self::Aimed,
@@ -84,17 +84,17 @@ choices! {
     /// Where the numbers of paths come from.
     #[repr(u32)]
     pub enum Sampler {
-        /// Scrambled Sobol' sequences: samples that spread evenly, over an iteration's photons and over a pixel's iterations.
+        /// Scrambled Sobol' sequences: samples with low discrepancy, over an iteration's photons and over a pixel's iterations.
         Sobol = SOBOL => "sobol",
         /// Independent numbers, from a hash.
         Independent = INDEPENDENT => "independent",
-        /// A congruential generator for each path, as in the paper; neighbouring paths are correlated: for comparison alone.
+        /// A congruential generator for each path, as in the paper; neighbouring paths are correlated: only for comparison.
         Congruential = CONGRUENTIAL => "congruential",
     }
 }
 
 impl Sampler {
-    /// What an estimator uses where the user doesn't say: the paper's has independent numbers.
+    /// The default of an estimator: the paper's has independent numbers.
     pub const fn of(estimator: Estimator) -> Self {
         match estimator {
             Estimator::Sppm => Self::Sobol,
@@ -118,22 +118,21 @@ pub struct RenderConfig {
     pub alpha: f32,
     /// Initial radius in scene units; automatic if `None`.
     pub radius: Option<f64>,
-    /// Index into [`crate::gather::METHODS`]; the fastest of what renders if `None`.
+    /// Index into [`crate::gather::METHODS`]; the fastest one if `None`.
     pub gather: Option<usize>,
-    /// Photons that a cell of the method `cluster-grid` holds at the most; what is beyond is lost. Without it cells hold
-    /// all.
+    /// Maximum number of photons in a cell of the method `cluster-grid`; photons beyond it are lost. Unlimited if `None`.
     pub cell_photons: Option<u32>,
     /// How rays meet triangles.
     pub accel: Accel,
     /// How a ray is tested against a triangle.
     pub triangle_test: TriangleTest,
-    /// Bounces of a path at the most.
+    /// Maximum number of bounces of a path.
     pub max_depth: u32,
     /// Whether photons that no visible point can accept are dropped where they land, by the estimator `sppm`.
     pub drop_unwanted: bool,
     /// How photon paths start.
     pub emission: EmissionChoice,
-    /// Whether paths are aimed even where pilots say that it isn't worth its cost.
+    /// Whether paths are aimed even if pilots find that it does not pay for its cost.
     pub aims_anyway: bool,
     /// Where the numbers of paths come from.
     pub sampler: Sampler,
@@ -147,15 +146,15 @@ impl Default for RenderConfig {
     }
 }
 
-/// Pixels of a picture's side at the most.
+/// Maximum number of pixels of a picture's side.
 pub const MAX_SIDE: u32 = 16384;
 
-/// How many of so many iterations are of a sequence.
+/// Number of the first `iterations` iterations that belong to a sequence.
 pub fn iterations_of(sequence: u32, iterations: u32) -> u32 {
     iterations / SEQUENCES + u32::from(sequence < iterations % SEQUENCES)
 }
 
-/// Paths of a pixel in an iteration at the most: so many cost little beside as many photon paths.
+/// Maximum number of camera paths of a pixel in an iteration: that many are cheap compared with the photon paths.
 const MOST_CAMERA_PATHS: u32 = 8;
 
 fn in_range<T>(setting: Setting, value: impl Display, checked: Checked<T>) -> Result<()> {
@@ -166,7 +165,7 @@ fn in_range<T>(setting: Setting, value: impl Display, checked: Checked<T>) -> Re
 }
 
 impl RenderConfig {
-    /// What the user gets who says nothing; the arguments' defaults are these.
+    /// The defaults, also of the program's arguments.
     pub const DEFAULT: Self = Self {
         resolution: [1280, 720],
         photons: 100_000,
@@ -209,13 +208,13 @@ impl RenderConfig {
         Ok(())
     }
 
-    /// Whether photons that no visible point can accept are dropped where they land. The paper keeps all.
+    /// Whether photons that no visible point can accept are dropped where they land. The paper keeps all photons.
     pub fn drops_unwanted(&self) -> bool {
         self.drop_unwanted && self.estimator == Estimator::Sppm
     }
 
-    /// First iteration of the block of `iteration`. With each block the photons' [`SEQUENCES`] begin anew, since they may be
-    /// aimed anew. Blocks grow with the render, to the half of it.
+    /// First iteration of the block of `iteration`. With each block the photons' [`SEQUENCES`] begin anew, because the emission
+    /// table may change then. Blocks grow with the render, up to half of it.
     pub fn block_of(&self, iteration: u32) -> u32 {
         let octave = if iteration < 2 * SEQUENCES {
             iteration / SEQUENCES * SEQUENCES
@@ -227,13 +226,13 @@ impl RenderConfig {
         octave.max(iteration / most * most)
     }
 
-    /// Whether photons' sequences begin anew with an iteration, so that they may be aimed anew.
+    /// Whether photons' sequences begin anew with an iteration, so that the emission table may change.
     pub fn begins_sequences(&self, iteration: u32) -> bool {
         iteration - self.block_of(iteration) < if iteration < 2 * SEQUENCES { SEQUENCES } else { 1 }
     }
 
-    /// Paths of a pixel in an iteration: about one for each photon path. All of them see what is lit directly, the first one's
-    /// visible point gathers photons. The paper has one.
+    /// Camera paths of a pixel in an iteration: about one for each photon path. All of them sample direct light, the visible
+    /// point of the first one gathers photons. The paper has one.
     pub fn camera_paths(&self) -> u32 {
         let pixels = self.resolution[0].saturating_mul(self.resolution[1]).max(1);
         match self.estimator {
@@ -242,25 +241,25 @@ impl RenderConfig {
         }
     }
 
-    /// Points of the disc around each visible point that `coverage` asks in an iteration: many at first, since what few say
-    /// is worse than nothing.
+    /// Number of points of each disc that `coverage` tests in an iteration: many at first, because a correction by few points is
+    /// worse than none.
     pub fn coverage_points(&self, iteration: u32) -> u32 {
         COVERAGE_WHOLE >> iteration.saturating_add(1).ilog2().min(COVERAGE_WHOLE.ilog2())
     }
 
-    /// Whether shadow rays that end on glass go on in an iteration to say what light lies behind it: in the first ones, and
-    /// then now and then, since it takes more rays. Of the first ones, points that have photons take a part in the very first.
+    /// Whether shadow rays that end on glass continue in an iteration to estimate the light behind it: in the first iterations,
+    /// then rarely, because it takes more rays. Points that have photons do so only in the very first one of them.
     pub fn asks_behind_glass(&self, iteration: u32) -> bool {
         iteration < 8 || iteration.is_multiple_of(ASKS_EVERY)
     }
 
-    /// Photon paths of the block before `iteration` that are of its sequence.
+    /// Number of photon paths of the block before `iteration` that belong to its sequence.
     pub fn first_of_sequence(&self, iteration: u32) -> u32 {
         ((iteration - self.block_of(iteration)) / SEQUENCES).wrapping_mul(self.photons)
     }
 }
 
-/// How much has been rendered.
+/// Totals of a render.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Totals {
     /// Iterations.
@@ -272,14 +271,14 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Adds what another part of a render has rendered.
+    /// Adds the totals of another part of the render.
     pub fn add(&mut self, other: Self) {
         self.iterations += other.iterations;
         self.emitted += other.emitted;
         self.camera_paths += other.camera_paths;
     }
 
-    /// What a picture is divided by, also where nothing has been rendered.
+    /// Divisors of a picture, also if nothing has been rendered.
     pub fn at_least_one(self) -> Self {
         Self {
             iterations: self.iterations.max(1),

@@ -1,5 +1,5 @@
-//! The library's errors. Each message says in one line what is wrong, where, and what to do about it. None names a program's
-//! flags: [`Setting`] and [`Remedy`] tell a program which of its own to name.
+//! The library's errors. Each message says in one line what is wrong, where, and what to do about it. None names flags of a
+//! program: a program derives them from [`Setting`] and [`Remedy`].
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Result of a library function.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Everything that can go wrong outside the program's own logic.
+/// Errors of input, environment and device.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -16,7 +16,7 @@ pub enum Error {
     Scene {
         /// The scene file.
         path: PathBuf,
-        /// What is wrong, where in the file, and what to do.
+        /// What is wrong, where in the file, and how to fix it.
         what: String,
     },
     /// A scene or an environment that needs more memory than [`LoadOptions::memory_limit`](crate::LoadOptions::memory_limit).
@@ -24,12 +24,12 @@ pub enum Error {
     Memory {
         /// The file.
         path: PathBuf,
-        /// What needs how much.
+        /// The item and its size.
         what: String,
-        /// Bytes that would have been enough when it was refused.
+        /// A limit in bytes that would have been sufficient at this point.
         needed: u64,
     },
-    /// A setting outside its range, or one that doesn't suit the scene or the device.
+    /// A setting outside its range, or one that does not fit the scene or the device.
     #[error("{setting} {what}")]
     Setting {
         /// Which one.
@@ -37,7 +37,7 @@ pub enum Error {
         /// Its value, and what is wrong with it.
         what: String,
     },
-    /// Something that was asked for and can't be.
+    /// A request that can't be fulfilled.
     #[error("{0}")]
     Config(String),
     /// A file that can't be read or written.
@@ -45,18 +45,18 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What failed, and what to do.
+        /// What failed, and how to fix it.
         what: String,
     },
     /// A device that failed.
     #[error("{0}")]
     Device(String),
-    /// No usable Vulkan loader or device, or a device that can't do what is asked of it.
+    /// No usable Vulkan loader or device, or a device whose limits are exceeded.
     #[error("{what}; {remedy}")]
     Unfit {
         /// What is wrong.
         what: String,
-        /// What helps.
+        /// Advice.
         remedy: Remedy,
     },
     /// A Vulkan call that failed.
@@ -69,7 +69,7 @@ pub enum Error {
     },
 }
 
-/// A setting, named as its field in [`RenderConfig`](crate::RenderConfig) or as what it sets of a lens.
+/// A setting, named as its field in [`RenderConfig`](crate::RenderConfig) or as a property of a lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Setting {
@@ -87,7 +87,7 @@ pub enum Setting {
     CellPhotons,
     /// How photons are gathered.
     Gather,
-    /// How rays meet triangles.
+    /// Ray tracing method.
     Accel,
     /// A lens's radius.
     Aperture,
@@ -112,7 +112,7 @@ impl fmt::Display for Setting {
     }
 }
 
-/// What helps where a device can't do what is asked of it.
+/// Advice for a device whose limits are exceeded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Remedy {
@@ -122,13 +122,13 @@ pub enum Remedy {
     InstallDriver,
     /// Another device, or the CPU.
     AnotherDevice,
-    /// Another Vulkan device: the CPU has nothing to say here.
+    /// Another Vulkan device; the CPU is no alternative here.
     AnotherVulkanDevice,
     /// A device that is named by more of its name, or by its index.
     NameOneDevice,
     /// Fewer photons or a smaller picture.
     SmallerRender,
-    /// A picture of so many pixels, another device, or the CPU.
+    /// A picture of this resolution, another device, or the CPU.
     Resolution([u32; 2]),
     /// A scene with smaller textures, another device, or the CPU.
     SmallerTextures,
@@ -159,7 +159,7 @@ impl fmt::Display for Remedy {
 }
 
 impl Error {
-    /// A device that can't do what is asked of it.
+    /// A device whose limits are exceeded.
     pub(crate) fn unfit(what: impl Into<String>, remedy: Remedy) -> Self {
         Self::Unfit {
             what: one_line(what.into()),

@@ -1,18 +1,13 @@
-//! How far the picture is from the truth, as far as it can tell by itself.
+//! Estimates the error of a picture during the render, without a reference.
 //!
-//! The picture after n iterations is the mean of n pictures: eq. 3 scales τ as eq. 2 scales R², so τ / R² is the sum of
-//! every iteration's flux over its own R². Iterations take turns with sequences of random numbers that are independent of each
-//! other ([`SEQUENCES`]): the spread of the sequences' means tells the noise.
-//!
-//! The bias is what R blurs. Photons are summed up a second time, weighed with 1 − 2 d²/R² by their distance d: where their
-//! density is even or falls evenly that sum vanishes, where it bends it is a third of what the blur adds, with the opposite
-//! sign. (Hachisuka and others, «A Progressive Error Estimation Framework for Photon Density Estimation», 2010, have the same
-//! two parts, and derivatives from a kernel of their own.)
-//!
-//! The paper's estimator looks through the centres of pixels for ever. What that leaves out is told from how much pixels
-//! differ from their neighbours (`estimate/parts.rs`).
-//!
-//! Light behind glass, which photons alone bring, is missing until they found it (`estimate/missing.rs`).
+//! The picture after n iterations is the mean of n pictures: eq. 3 scales τ as eq. 2 scales R², so τ / R² is the sum of every
+//! iteration's flux over its own R². Iterations take turns with sequences of random numbers that are independent of each other
+//! ([`SEQUENCES`]): the spread of the sequences' means estimates the noise. The bias is the blur within R. Photons are summed up
+//! a second time, weighted with 1 − 2 d²/R² by their distance d: for a constant or linear density that sum is 0 on average, for a
+//! quadratic one it is a third of the bias, with the opposite sign. (Hachisuka and others, «A Progressive Error Estimation
+//! Framework for Photon Density Estimation», 2010, have the same two parts, with derivatives from a separate kernel.) The paper's
+//! estimator samples only the centres of pixels. That error is estimated from the differences of neighbouring pixels
+//! (`estimate/parts.rs`). Light behind glass, which only photons carry, is missing until they find it (`estimate/missing.rs`).
 
 mod missing;
 mod parts;
@@ -28,17 +23,17 @@ use crate::packing::PackedScene;
 use parts::{OfPixel, Parts};
 use spread::{Spread, Weights};
 
-/// Bias over curvature, root of the mean square: 3 where the density bends evenly, for a disc's means of r² and of
-/// r² (1 − 2 r²) are 1/2 and −1/6; 5.46 across the edge of a shadow, by integrating both over its distance. Between them, and
-/// nearer to the former: at the edges of caustics discs are small.
+/// Bias over curvature, root of the mean square: 3 for a quadratic density, for a disc's means of r² and of r² (1 − 2 r²) are 1/2
+/// and −1/6; 5.46 across the edge of a shadow, by integrating both over its distance. Between them, and nearer to the former: at
+/// the edges of caustics discs are small.
 const BIAS_PER_CURVATURE: f64 = 3.4;
-/// Part of the error from which on its cause is worth a word.
+/// Minimum share of the error for a cause to be reported.
 const NOTABLE: f64 = 0.2;
 
-/// What the error of a render's pictures is estimated by.
+/// The estimator of the error of a render's pictures.
 #[derive(Debug, Clone, Copy)]
 pub struct ErrorEstimate {
-    /// Whether pixels are seen through their centres alone.
+    /// Whether pixels are sampled at their centres only.
     sees_centres: bool,
     photon: OnePhoton,
 }
@@ -46,17 +41,18 @@ pub struct ErrorEstimate {
 /// An estimate of the relative error, as root of relMSE.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RelativeError {
-    /// All of it.
+    /// The total error.
     pub total: f64,
-    /// By noise.
+    /// Noise.
     pub noise: f64,
-    /// By the blur of the radius.
+    /// Blur of the radius.
     pub bias: f64,
-    /// By looking through the centres of pixels alone, which [`Estimator::Ppm`] does.
+    /// Aliasing by sampling the centres of pixels only, as [`Estimator::Ppm`] does.
     pub aliasing: f64,
-    /// By light behind glass that no photon has found yet.
+    /// Light behind glass that no photon has found yet.
     pub missing: f64,
-    /// Share of the pixels that wait for their first photon, where what one would bring is a notable part of the error; else 0.
+    /// Share of the pixels that wait for their first photon, if the contribution of one photon is a notable part of the error;
+    /// otherwise 0.
     pub waiting: f64,
 }
 
@@ -76,8 +72,8 @@ impl std::fmt::Display for RelativeError {
     }
 }
 
-/// A pixel in the dark beside a bright patch has little of its own: against what R brings it from there the error would seem
-/// small. Of the curvature, four times the standard error is in doubt.
+/// A dark pixel beside a bright area has little light of its own: relative to the light that R blurs into it, the error would
+/// seem small. Four standard errors of the curvature are uncertain.
 fn own_part(curvature: &Spread, channels: &[Spread; 3]) -> f64 {
     let brought = BIAS_PER_CURVATURE * (-curvature.mean - 4.0 * curvature.noise2().sqrt()).max(0.0);
     let mean = channels.iter().map(|channel| channel.mean).sum::<f64>() / 3.0;
@@ -88,21 +84,21 @@ fn own_part(curvature: &Spread, channels: &[Spread; 3]) -> f64 {
     }
 }
 
-/// What a photon gives a white surface in one iteration. That none has come to a pixel is a number that may as well have been
-/// one: what one would give is the standard error there.
+/// The radiance of a white surface by one photon in one iteration. A pixel without photons might as well have received one: that
+/// contribution is its standard error.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct OnePhoton {
     /// Radiance.
     pub radiance: f64,
-    /// R² for which this holds, square render units.
+    /// The corresponding R², in square render units.
     pub radius2: f64,
 }
 
-/// Of a photon of the pilots' average flux, or of the lights' average power, at the median of the initial radii.
+/// For a photon of the pilots' average flux, or of the lights' average power, at the median of the initial radii.
 pub fn of_one_photon(scene: &PackedScene, backend: &dyn Backend, config: &RenderConfig) -> OnePhoton {
     let radius2 = f64::from(backend.radius()).powi(2);
     if radius2 == 0.0 {
-        // No surface has been seen.
+        // No surface is visible.
         return OnePhoton::default();
     }
     let flux = backend.photon_flux().unwrap_or(scene.power);
@@ -113,7 +109,7 @@ pub fn of_one_photon(scene: &PackedScene, backend: &dyn Backend, config: &Render
 }
 
 impl ErrorEstimate {
-    /// Of a render; `photon` is [`of_one_photon`].
+    /// For a render; `photon` is [`of_one_photon`].
     pub fn new(config: &RenderConfig, photon: OnePhoton) -> Self {
         Self {
             sees_centres: config.estimator == Estimator::Ppm,
@@ -121,13 +117,14 @@ impl ErrorEstimate {
         }
     }
 
-    /// Whether an estimate is worth its time after so many iterations: each sequence has had as many of them, and they are a
-    /// fourth more than the last time or so.
+    /// Whether an estimate pays for its time after this number of iterations: all sequences have had the same number, and it has
+    /// grown by about a quarter since the last estimate.
     pub fn is_due(iterations: u32) -> bool {
         iterations >= SEQUENCES && iterations.is_multiple_of(SEQUENCES.max(1 << iterations.ilog2().saturating_sub(2)))
     }
 
-    /// What the picture after so many iterations says; `None` before each sequence has had one, and while the picture is black.
+    /// The squared errors of the picture after `iterations` iterations; `None` before each sequence has had one, and while the
+    /// picture is black.
     fn parts(&self, iterations: u32, picture: &Resolved) -> Option<Parts> {
         let floor = floor_of(&picture.image);
         if iterations < SEQUENCES || floor <= 0.0 {
@@ -148,7 +145,7 @@ impl ErrorEstimate {
             let curvature = spread_of(pixel, 3);
             let without_photons = picture.waits[pixel];
             let photon2 = if without_photons { photon.powi(2) } else { 0.0 };
-            // Without the pixel itself.
+            // Excluding the pixel itself.
             let mean_around = |channel: usize, value: f64| {
                 let (sum, count) = around[channel][pixel];
                 if count > 1 {
@@ -180,7 +177,7 @@ impl ErrorEstimate {
         })
     }
 
-    /// The error of the picture after so many iterations; `None` before there are enough, and while it is black.
+    /// The error of the picture after `iterations` iterations; `None` before there are enough, and while it is black.
     pub fn relative(&self, iterations: u32, picture: &Resolved) -> Option<RelativeError> {
         let parts = self.parts(iterations, picture)?;
         let noise2 = parts.relative_noise2();
@@ -202,8 +199,8 @@ impl ErrorEstimate {
         })
     }
 
-    /// The error of each pixel, root of the mean square, in units of radiance; `None` as in [`ErrorEstimate::relative`], of
-    /// whose error it is the parts. A pixel's bias is that of the pixels around it: its own is all but lost in noise.
+    /// The error of each pixel, root of the mean square, in units of radiance; `None` as in [`ErrorEstimate::relative`], whose
+    /// error they add up to. A pixel's bias is that of the pixels around it: its own estimate is dominated by noise.
     pub fn of_pixels(&self, iterations: u32, picture: &Resolved) -> Option<Image> {
         let parts = self.parts(iterations, picture)?;
         let errors = parts

@@ -1,4 +1,4 @@
-//! Files: those that are read are regular ones, those that are written are whole or absent.
+//! File access: only regular files are read; written files are complete or absent.
 
 use crate::error::{Error, Result};
 use std::fs::{self, File};
@@ -7,7 +7,7 @@ use std::path::{Path, is_separator};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
 
-/// Writers at work.
+/// Number of active writers.
 static WRITERS: Mutex<usize> = Mutex::new(0);
 
 fn writers() -> MutexGuard<'static, usize> {
@@ -19,7 +19,7 @@ fn writers() -> MutexGuard<'static, usize> {
 pub struct Writing(());
 
 impl Writing {
-    /// Begins.
+    /// Marks a write as active.
     pub fn begin() -> Self {
         *writers() += 1;
         Self(())
@@ -32,8 +32,8 @@ impl Drop for Writing {
     }
 }
 
-/// Does `end`, which ends the process, unless something is being written: no temporary file is left behind. Nothing begins to
-/// be written meanwhile.
+/// Calls `end`, which ends the process, unless a write is active, so that no temporary file is left behind. No write begins
+/// meanwhile.
 pub fn unless_writing(end: impl FnOnce()) {
     let writers = writers();
     if *writers == 0 {
@@ -44,7 +44,7 @@ pub fn unless_writing(end: impl FnOnce()) {
 /// Opens a file for reading.
 ///
 /// # Errors
-/// What can't be opened, and what is no regular file: opening a pipe would wait for a writer, and a device may have no end.
+/// A file that can't be opened or is not a regular file: opening a pipe would wait for a writer, and a device may be endless.
 pub fn open(path: &Path) -> Result<File> {
     let unopened = |error: io::Error| {
         Error::file(
@@ -61,17 +61,17 @@ pub fn open(path: &Path) -> Result<File> {
     File::open(path).map_err(unopened)
 }
 
-/// Checks that a file can be written at `path`, and leaves nothing behind: to be called before a long rendering.
+/// Checks that a file can be written at `path`, and leaves nothing behind; for use before a long render.
 ///
 /// # Errors
-/// A path that names no file, a folder, or something else than a regular file; a file that may not be overwritten; a
-/// folder that doesn't exist or can't be written to.
+/// A path without a file name, a folder, or another file that is not regular; a file that may not be overwritten; a folder that
+/// does not exist or can't be written to.
 pub fn check_writable(path: &Path) -> Result<()> {
     let _writing = Writing::begin();
     temporary_beside(path).map(drop)
 }
 
-/// Writes `bytes` to `path`, whole or not at all: to a temporary file in the same folder, which is then renamed.
+/// Writes `bytes` to `path` atomically: to a temporary file in the same folder, which is then renamed.
 ///
 /// # Errors
 /// As [`check_writable`]; further if the disk is full.
@@ -85,7 +85,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let _writing = Writing::begin();
     let mut temporary = temporary_beside(path)?;
     temporary.write_all(bytes).map_err(failed)?;
-    // Without it a power cut soon after the renaming could leave an empty file of the right name.
+    // Otherwise a power failure soon after the renaming could leave an empty file.
     temporary.as_file().sync_all().map_err(failed)?;
     temporary.persist(path).map_err(|error| failed(error.error))?;
     Ok(())
@@ -113,7 +113,7 @@ fn temporary_beside(path: &Path) -> Result<NamedTempFile> {
         Ok(existing) if !existing.is_file() => {
             return Err(unwritable("it is no regular file; name another".to_owned()));
         }
-        // Renaming asks for permission to change the folder, not the file.
+        // Renaming needs permission for the folder, not for the file.
         Ok(_) => {
             File::options()
                 .write(true)
@@ -125,7 +125,7 @@ fn temporary_beside(path: &Path) -> Result<NamedTempFile> {
     }
     let mut builder = tempfile::Builder::new();
     builder.prefix(".ppm-vk-");
-    // A temporary file is its owner's alone by default, and renaming keeps that; the umask still applies to this.
+    // Temporary files are private to their owner, and renaming keeps that; the umask still applies to this mode.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder).map_err(|error| {

@@ -1,22 +1,22 @@
-//! Points in a k-d tree, to find those near a place.
+//! A k-d tree of points, to find those near a position.
 
 use std::collections::BinaryHeap;
 
-/// Points of a part that isn't parted further.
+/// Maximum number of points in a leaf.
 const LEAF: usize = 12;
-/// Points of a part that is worth a task of its own.
+/// Minimum number of points in a part for a parallel task.
 const TASK: usize = 1 << 14;
 
-/// Points in a k-d tree. Each part of [`KdTree::points`] is parted by its middle point, along the axis in which it is longest.
+/// A k-d tree of points. Each part of [`KdTree::points`] is split at its median, along its longest axis.
 pub struct KdTree {
     /// Position and index of each point.
     points: Vec<([f32; 3], u32)>,
-    /// The axis that a part's middle point parts it along.
+    /// The axis of the split at each median.
     axes: Vec<u8>,
 }
 
 impl KdTree {
-    /// Of points that are known by their indices.
+    /// A tree of points with their indices.
     pub fn new(positions: &[[f32; 3]]) -> Self {
         let mut points: Vec<_> = positions.iter().copied().zip(0..).collect();
         let mut axes = vec![0; points.len()];
@@ -34,9 +34,9 @@ impl KdTree {
         });
     }
 
-    /// Squared distances and indices of the `count` points that are nearest, those first.
+    /// Squared distances and indices of the `count` nearest points, in ascending order.
     pub fn nearest(&self, centre: [f32; 3], count: usize) -> Vec<(f32, usize)> {
-        // Positive numbers have the order of their bits.
+        // Positive floats are ordered like their bits.
         let mut found: BinaryHeap<(u32, u32)> = BinaryHeap::with_capacity(count + 1);
         self.search(0, self.points.len(), centre, &mut |distance2, index| {
             found.push((distance2.to_bits(), index));
@@ -54,8 +54,8 @@ impl KdTree {
             .collect()
     }
 
-    /// Calls `see` with the squared distance and the index of points of a part; it returns the squared distance up to which others
-    /// count.
+    /// Calls `see` with the squared distance and the index of points of a part; it returns the maximum squared distance of
+    /// further points.
     fn search(&self, begin: usize, end: usize, centre: [f32; 3], see: &mut impl FnMut(f32, u32) -> f32) {
         if end - begin <= LEAF {
             for (position, index) in &self.points[begin..end] {
@@ -84,7 +84,7 @@ fn distance2(a: [f32; 3], b: [f32; 3]) -> f32 {
     x * x + y * y + z * z
 }
 
-/// Orders the points of a part, and of the parts of it.
+/// Orders the points of a part, recursively.
 fn part(points: &mut [([f32; 3], u32)], axes: &mut [u8]) {
     if points.len() <= LEAF {
         return;

@@ -1,43 +1,43 @@
-//! The first radii, where the user gives none: in footprints of the pixels.
+//! Automatic initial radii, in footprints of the pixels.
 
 use crate::config::pixel_of;
 use crate::kd_tree::KdTree;
 use crate::layout::{CAUSTIC, NO_OBJECT, Photon, Statistics, VisiblePoint};
 
-/// How many photons a visible point may be wanted to accept in the first iteration. The first is what the others' blur is
-/// measured against.
+/// Candidates for the number of photons that a visible point accepts in the first iteration. The blur of the others is measured
+/// relative to the first.
 const OF_GLOBAL: [&[usize]; 1] = [&[8, 12, 16, 24, 32, 48, 64]];
-/// The same of caustic photons, which have edges: where the first of a list is best, it may be one of the next list.
+/// The same for caustic photons, which have edges: if the first of a list is best, the next list is tried.
 const OF_CAUSTICS: [&[usize]; 2] = [&[8, 12, 16], &[4, 6, 8]];
-/// The iteration whose photons the radius is found from; no render gets that far.
+/// The iteration whose photons determine the radius; no render gets that far.
 pub const PILOT: u32 = u32::MAX;
 /// Rounds of shrinking the radius where photons are denser than wanted.
 pub const FITS: u32 = 2;
-/// A density that is more times too high counts as so many times too high: it is in the dark.
+/// Clamp of the ratio of densities: a larger ratio means a dark region.
 const MOST_BLUR: f64 = 4.0;
-/// Visible points that are asked.
+/// Number of visible points that are sampled.
 const PROBES: usize = 2048;
-/// Footprints of a pixel that R has at the most, of global and of caustic photons: a larger disc would blur what can be seen.
-/// Caustics have finer detail.
+/// Maximum R of global and of caustic photons, in footprints: a larger disc would blur visible detail. Caustics have finer
+/// detail.
 pub const MOST_FOOTPRINTS: [f32; 2] = [32.0, 8.0];
-/// R of the discs for which pilot photons are wanted, footprints: large enough that all that is seen is covered, small enough that
-/// the room behind a wall isn't.
+/// R of the discs for pilot photons, in footprints: large enough to cover everything visible, small enough not to cover the room
+/// behind a wall.
 pub const PILOT_FOOTPRINTS: f32 = 4.0;
-/// Footprints that R has at least before the first photon: a smaller disc would show nothing more.
+/// Minimum initial R, in footprints: a smaller disc would show no more detail.
 pub const LEAST_FOOTPRINTS: f32 = 0.5;
 
-/// What the discs of a photon map begin with.
+/// Initial discs of a photon map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct First {
-    /// R, footprints.
+    /// R, in footprints.
     pub footprints: f32,
-    /// Photons that a visible point should accept in the first iteration, at the most; the median one finds as many
-    /// within R unless a bound holds.
+    /// Maximum number of photons that a visible point should accept in the first iteration; the median point finds that many
+    /// within R, unless R is clamped.
     pub photons: usize,
 }
 
-/// The same of each photon map, from pilot photons. `footprints` are those of the visible points, `share` the pilot's part of
-/// an iteration's photon paths.
+/// Initial discs of each photon map, from pilot photons. `footprints` are those of the visible points, `share` is the pilot's
+/// share of an iteration's photon paths.
 pub fn first(visible_points: &[VisiblePoint], footprints: &[f32], photons: &[Photon], share: f32) -> [First; 2] {
     let in_map = |photon: &&Photon| photon.position_object[3].to_bits() & CAUSTIC != 0;
     let (caustic, global): (Vec<&Photon>, Vec<&Photon>) = photons.iter().partition(in_map);
@@ -52,11 +52,11 @@ pub fn first(visible_points: &[VisiblePoint], footprints: &[f32], photons: &[Pho
     })
 }
 
-/// Pixels by which R may grow from a pixel to its neighbour.
+/// Maximum growth of R from a pixel to its neighbour, in pixels.
 const SLOPE: f32 = 0.2;
 
-/// Lets no caustic disc be much larger than those of the pixels around: light has edges, and a disc beside one that reached
-/// past it would make it blurred. `statistics`: of all slots, one a pixel.
+/// Limits caustic discs relative to those of the surrounding pixels: caustics have edges, and a disc that reaches across one
+/// would blur it. `statistics`: of all slots, one a pixel.
 pub fn sharpen(resolution: [u32; 2], footprints: &[f32], statistics: &mut [Statistics]) {
     let [width, height] = resolution.map(|side| side as usize);
     let mut radii = vec![f32::INFINITY; width * height];
@@ -90,13 +90,13 @@ pub fn sharpen(resolution: [u32; 2], footprints: &[f32], statistics: &mut [Stati
     }
 }
 
-/// Whether photons are to be dropped that no visible point wants: what is aimed needs to know what is wanted, and asking costs
-/// more than it saves where nearly all photons are.
+/// Whether photons that no visible point can accept are dropped: aiming needs the demand anyway; otherwise the look-up costs more
+/// than it saves if nearly all photons are wanted.
 pub fn is_dropping_worth_it(landed: u64, kept: u64, aims: bool) -> bool {
     aims || kept < landed - landed / 4
 }
 
-/// Mean flux of photons, mean of the channels; `None` of none.
+/// Mean flux of photons, mean of the channels; `None` without photons.
 pub fn mean_flux(photons: &[Photon]) -> Option<f64> {
     let flux = |photon: &Photon| {
         photon.flux_direction[..3]
@@ -109,7 +109,7 @@ pub fn mean_flux(photons: &[Photon]) -> Option<f64> {
     (sum > 0.0).then(|| sum / photons.len() as f64)
 }
 
-/// The median of the radii before the first photon of the slots that have one; 0 where none has.
+/// The median of the initial radii of the slots that have one; 0 if none has.
 pub fn median(statistics: &[Statistics]) -> f32 {
     let mut radii2: Vec<f32> = statistics
         .iter()
@@ -140,8 +140,9 @@ struct Near {
     distances2: Vec<f32>,
 }
 
-/// Chooses how many photons visible points should accept, so that noise and blur together are least, and R such that the
-/// median one does. With α = 2/3 the squares of both fall alike, so that the choice holds for any number of iterations.
+/// Chooses the number of photons that visible points should accept, so that noise and blur together are minimal, and R such that
+/// the median point does. With α = 2/3 the squares of both decrease at the same rate, so the choice holds for any number of
+/// iterations.
 fn automatic(
     visible_points: &[VisiblePoint],
     footprints: &[f32],
@@ -175,8 +176,8 @@ fn automatic(
     automatic
 }
 
-/// Squared relative error of densities from the nearest `count` photons: 1/count of noise, and of blur what they differ
-/// from those of the nearest `fewest`. `None` if no probe has so many photons.
+/// Squared relative error of densities from the nearest `count` photons: 1/count by noise, and the difference to the densities of
+/// the nearest `fewest` by blur. `None` if no probe has that many photons.
 fn error2(probes: &[Near], fewest: usize, count: usize) -> Option<f64> {
     let ratios: Vec<f64> = probes
         .iter()
@@ -187,14 +188,14 @@ fn error2(probes: &[Near], fewest: usize, count: usize) -> Option<f64> {
     if ratios.is_empty() {
         return None;
     }
-    // Of photons that lie evenly, few/all is Beta(fewest, count − fewest) distributed.
+    // For a uniform density, few/all is Beta(fewest, count − fewest) distributed.
     let (few, all) = (fewest as f64, count as f64);
     let by_chance = (all - few) / (few * (all + 1.0));
     let squares: f64 = ratios.iter().map(|ratio| (ratio.min(MOST_BLUR) - 1.0).powi(2)).sum();
     Some(1.0 / all + (squares / ratios.len() as f64 - by_chance).max(0.0))
 }
 
-/// Of some visible points, the nearest photons on their object, if there are as many as the first candidate.
+/// The nearest photons on the objects of sampled visible points, if there are as many as the first candidate.
 fn nearest(
     visible_points: &[VisiblePoint],
     footprints: &[f32],
@@ -226,7 +227,7 @@ fn nearest(
             distances2: on_object.map(|(distance2, _)| distance2).take(most).collect(),
         }
     });
-    // A photon at the very point says nothing of densities.
+    // A photon exactly at the point gives no density.
     let enough = |near: &Near| {
         let least = near.distances2.get(fewest - 1);
         least.is_some_and(|&distance2| distance2 > 0.0)

@@ -1,12 +1,11 @@
-//! The numbers that `glsl/common/random.glsl` draws, bit for bit. The host needs them too, to know where photon paths
-//! started.
+//! The random numbers of `glsl/common/random.glsl`, bit for bit. The host needs them to reconstruct the starts of photon paths.
 
 mod sobol;
 
 use crate::config::{RenderConfig, SEQUENCES, Sampler};
 use crate::layout::{CAMERA_PATH, COVERAGE_SAMPLE, LIGHT_SAMPLE, PHOTON_PATH};
 
-/// What kind of path draws: mixed into the seed, so that kinds don't draw the same numbers.
+/// The kind of a path: mixed into the seed, so that kinds have different numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum PathKind {
@@ -20,26 +19,26 @@ pub enum PathKind {
     Coverage = COVERAGE_SAMPLE,
 }
 
-/// One of an iteration's paths of a pixel, or of what they lead to.
+/// The camera path of a pixel in an iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CameraTurn {
     /// The iteration.
     pub iteration: u32,
     /// Number of the path.
     pub path: u32,
-    /// Of so many: [`RenderConfig::camera_paths`].
+    /// Total number of paths: [`RenderConfig::camera_paths`].
     pub paths: u32,
 }
 
 impl CameraTurn {
-    /// The only one of the first iteration.
+    /// The only path of the first iteration.
     pub const FIRST: Self = Self {
         iteration: 0,
         path: 0,
         paths: 1,
     };
 
-    /// Whose visible points gather photons.
+    /// The path whose visible points gather photons.
     pub fn that_gathers(config: &RenderConfig, iteration: u32) -> Self {
         Self {
             iteration,
@@ -48,44 +47,44 @@ impl CameraTurn {
         }
     }
 
-    /// The others of its iteration.
+    /// The other paths of its iteration.
     pub fn others(self) -> impl Iterator<Item = Self> {
         (1..self.paths).map(move |path| Self { path, ..self })
     }
 
-    /// As stages take it.
+    /// As push constants.
     pub fn words(self) -> [u32; 3] {
         [self.iteration, self.path, self.paths]
     }
 }
 
-/// The numbers of one path in one iteration.
+/// The random numbers of one path in one iteration.
 #[derive(Debug, Clone, Copy)]
 pub struct Random {
     sampler: Sampler,
     path: u32,
     iteration: u32,
-    /// The user's, mixed with the kind of path.
+    /// The user's seed, mixed with the kind of path.
     seed: u32,
     /// How many quadruples have been drawn.
     dimension: u32,
-    /// Of low discrepancy: a pixel's own, or one of all photons.
+    /// Low-discrepancy sequence: of a pixel, or of all photons.
     sequence: u32,
-    /// Of iterations whose numbers are one sequence.
+    /// Block of iterations whose numbers are one sequence.
     block: u32,
-    /// In that sequence.
+    /// Index in that sequence.
     index: u32,
-    /// Of the congruential generator.
+    /// State of the congruential generator.
     state: u32,
 }
 
 impl Random {
-    /// The numbers from the first one on of a path with independent numbers.
+    /// Independent random numbers of a path.
     pub fn new(kind: PathKind, path: u32, iteration: u32, seed: u32) -> Self {
         Self::with(Sampler::Independent, kind, path, iteration, seed)
     }
 
-    /// Those of another generator; of Sobol' sequences the first point.
+    /// The same with another generator; for Sobol' sequences, the first point.
     pub fn with(sampler: Sampler, kind: PathKind, path: u32, iteration: u32, seed: u32) -> Self {
         let seed = seed ^ kind as u32;
         Self {
@@ -103,7 +102,7 @@ impl Random {
         }
     }
 
-    /// Those of a pixel, or of something else that has a path in each turn.
+    /// The numbers of a pixel, or of another index that has one path in each turn.
     pub fn of_pixel(config: &RenderConfig, kind: PathKind, pixel: u32, turn: CameraTurn) -> Self {
         let CameraTurn { iteration, path, paths } = turn;
         Self {
@@ -120,7 +119,7 @@ impl Random {
         }
     }
 
-    /// Those of so many points of a disc. Several are a set of their own, later ones go on in one sequence.
+    /// The numbers of several points of a disc: they are one set; later sets continue one sequence.
     pub fn of_disc(config: &RenderConfig, slot: u32, iteration: u32, points: u32) -> Self {
         let (block, index) = if points > 1 {
             (iteration, 0)
@@ -135,7 +134,7 @@ impl Random {
         }
     }
 
-    /// The numbers of one of several samples that a path takes alike.
+    /// The numbers of one of several samples of the same kind in a path.
     pub fn sample_of(&self, number: u32, samples: u32) -> Self {
         Self {
             index: self.index.wrapping_mul(samples).wrapping_add(number),
@@ -146,12 +145,12 @@ impl Random {
         }
     }
 
-    /// Leaves out the quadruples before this one.
+    /// Skips the quadruples before this one.
     pub fn skip_to(&mut self, dimension: u32) {
         self.dimension = dimension;
     }
 
-    /// Those of a photon path; `path` counts those of the iteration.
+    /// The numbers of a photon path; `path` is its index in the iteration.
     pub fn of_photon(config: &RenderConfig, path: u32, iteration: u32) -> Self {
         Self {
             sequence: iteration % SEQUENCES,
@@ -161,7 +160,7 @@ impl Random {
         }
     }
 
-    /// Decides whether a ray passes the surface of this number that isn't there everywhere.
+    /// The number that decides whether a ray passes a partly transparent surface.
     pub fn number_of(&self, [first, second]: [u32; 2]) -> f64 {
         let [word, ..] = pcg4d([
             self.path ^ 0x616c_7068,

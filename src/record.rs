@@ -1,5 +1,5 @@
-//! Stages to commands: puts a barrier before each command that touches what an earlier one wrote, or writes what an
-//! earlier one read. Knows no Vulkan, so that the hazards of a whole iteration are tested without a device.
+//! Records stages as commands, with a barrier before each command that uses data that an earlier one wrote, or writes data that
+//! an earlier one read. Independent of Vulkan, so that the hazards of a whole iteration are tested without a device.
 
 use std::collections::{BTreeSet, HashMap};
 use std::time::Duration;
@@ -13,14 +13,14 @@ pub enum Command {
     Dispatch(StageDesc),
     /// Sets every word of a buffer.
     Fill(BufferId, u32),
-    /// Reads a buffer's first bytes back to the host, so many at the most.
+    /// Reads a buffer's first bytes back to the host, up to a maximum.
     ReadBack(BufferId, u64),
     /// Makes every write so far visible to every later command, and keeps those from starting before.
     Barrier,
 }
 
 impl Command {
-    /// The buffers that the command touches, and whether it writes them.
+    /// The buffers that the command uses, and whether it writes them.
     pub fn touches(&self) -> Vec<(BufferId, bool)> {
         match self {
             Self::Dispatch(stage) => stage
@@ -39,9 +39,9 @@ impl Command {
 pub struct Piece {
     /// The command's place in [`Recording::commands`].
     pub index: usize,
-    /// Which of its pieces it is.
+    /// Index of the piece.
     pub place: u32,
-    /// How many there are.
+    /// Number of pieces.
     pub count: u32,
 }
 
@@ -49,7 +49,7 @@ pub struct Piece {
 #[derive(Debug, Default)]
 pub struct Recording {
     commands: Vec<Command>,
-    /// Buffers touched since the last barrier, and whether they were written.
+    /// Buffers used since the last barrier, and whether they were written.
     pending: HashMap<BufferId, bool>,
 }
 
@@ -71,13 +71,13 @@ impl Recording {
         self.push(Command::Fill(buffer, word));
     }
 
-    /// Reads the first bytes of `buffer`, so many at the most, back to the host along with what the launches took.
+    /// Reads the first bytes of `buffer`, up to a maximum, back to the host together with the times of the launches.
     pub fn read_back(&mut self, buffer: BufferId, bytes: u64) {
         self.push(Command::ReadBack(buffer, bytes));
     }
 
-    /// Parts of the commands that take no longer than about `most_ns` each; a launch that takes longer is divided among several.
-    /// `expected_ns` is what a launch is expected to take: one of which that isn't known is a part of its own.
+    /// Splits the commands into parts of at most about `most_ns` each; a longer launch is divided among several parts.
+    /// `expected_ns` is the expected time of a launch: a launch of unknown time is a separate part.
     pub fn parts(&self, most_ns: f64, expected_ns: impl Fn(&StageDesc) -> Option<f64>) -> Vec<Vec<Piece>> {
         let mut parts = vec![Vec::new()];
         let mut sum = 0.0;
@@ -109,7 +109,7 @@ impl Recording {
         &self.commands
     }
 
-    /// The buffers that the commands touch, each once.
+    /// The buffers that the commands use, each once.
     pub fn buffers(&self) -> BTreeSet<BufferId> {
         let touches = self.commands.iter().flat_map(Command::touches);
         touches.map(|(buffer, _)| buffer).collect()
@@ -121,7 +121,7 @@ impl Recording {
             Some(written) => *writes || *written,
             None => false,
         });
-        // One global barrier serves as well as one a buffer: drivers flush caches as a whole.
+        // One global barrier is as good as one per buffer: drivers flush caches as a whole.
         if hazard {
             self.commands.push(Command::Barrier);
             self.pending.clear();
@@ -133,18 +133,18 @@ impl Recording {
     }
 }
 
-/// When a launch of a stage ran.
+/// The time of a launch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Launch {
     /// The stage.
     pub stage: &'static str,
     /// Begin, in nanoseconds of the device's clock.
     pub begin_ns: f64,
-    /// Nanoseconds that it took.
+    /// Duration in nanoseconds.
     pub duration_ns: f64,
 }
 
-/// What a run of a recording took.
+/// Times of a run of a recording.
 #[derive(Debug, Clone, Default)]
 pub struct Run {
     /// Its launches in order.
@@ -154,7 +154,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Adds what came after it.
+    /// Adds the times of a later run.
     pub fn add(&mut self, later: Self) {
         self.launches.extend(later.launches);
         self.wall += later.wall;

@@ -1,4 +1,4 @@
-//! What the stages took: the profile as a table, as JSON and as a Chrome trace.
+//! Profiles of stages: as a table, as JSON and as a Chrome trace.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -14,42 +14,42 @@ use crate::text::escaped;
 #[derive(Debug, Default)]
 pub struct Profile {
     runs: Vec<Run>,
-    /// When each began, since the render did.
+    /// Start of each, relative to the start of the render.
     begins: Vec<Duration>,
 }
 
-/// What is between the iterations, in microseconds: of the wall clock from one iteration's start to the next one's, what the
-/// device didn't work in.
+/// Gaps between iterations, in microseconds: the wall clock from one iteration's start to the next, minus the time in which the
+/// device worked.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Gaps {
-    /// The median one.
+    /// The median gap.
     pub median_us: f64,
-    /// All together: pictures that were made in between count.
+    /// Total, including pictures that were made in between.
     pub total_us: f64,
     /// Wall clock from the first iteration's start to the last one's.
     pub wall_us: f64,
 }
 
-/// What the launches of one stage took, in microseconds.
+/// Statistics of the launches of one stage, in microseconds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StageProfile {
     /// The stage.
     pub stage: &'static str,
-    /// How often it ran.
+    /// Number of launches.
     pub launches: usize,
     /// The shortest launch.
     pub min_us: f64,
     /// The median launch.
     pub median_us: f64,
-    /// The launch that 95 % are not longer than.
+    /// The 95th percentile.
     pub p95_us: f64,
     /// All launches together.
     pub total_us: f64,
-    /// Part of all stages' time.
+    /// Share of the time of all stages.
     pub share: f64,
 }
 
-/// What a profile is about.
+/// The subject of a profile.
 #[derive(Debug, Clone, Serialize)]
 pub struct Subject {
     /// The scene's name.
@@ -62,14 +62,14 @@ pub struct Subject {
     pub photons: u32,
     /// Photon paths of all iterations.
     pub photons_emitted: u64,
-    /// Where it ran.
+    /// The device.
     pub device: DeviceDescription,
-    /// What else happened.
+    /// Counters.
     pub counters: Counters,
 }
 
 impl Profile {
-    /// Adds an iteration that began so long after the render.
+    /// Adds an iteration that began at this time after the start of the render.
     pub fn add(&mut self, began: Duration, run: Run) {
         self.begins.push(began);
         self.runs.push(run);
@@ -80,10 +80,10 @@ impl Profile {
         self.runs.iter().map(|run| run.wall).sum()
     }
 
-    /// The host's gaps between iterations; `None` where there is only one.
+    /// The host's gaps between iterations; `None` for a single iteration.
     pub fn gaps(&self) -> Option<Gaps> {
         let walls = self.begins.windows(2).map(|pair| us(pair[1].saturating_sub(pair[0])));
-        // One that was begun while the one before still ran may have less wall clock of its own than work.
+        // An iteration that was submitted ahead may have less wall clock than work.
         let mut gaps: Vec<f64> = walls.zip(&self.runs).map(|(wall, run)| wall - busy_us(run)).collect();
         gaps.sort_by(f64::total_cmp);
         let (first, last) = (self.begins.first()?, self.begins.last()?);
@@ -232,7 +232,7 @@ fn us(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e6
 }
 
-/// Microseconds in which at least one launch ran: some run side by side.
+/// Time in which at least one launch ran, in microseconds: some run in parallel.
 fn busy_us(run: &Run) -> f64 {
     let mut spans: Vec<[f64; 2]> = run
         .launches
@@ -249,7 +249,7 @@ fn busy_us(run: &Run) -> f64 {
     busy * 1e-3
 }
 
-/// The value below which the part `q` of the sorted values lies.
+/// The quantile `q` of sorted values.
 fn quantile(sorted: &[f64], q: f64) -> f64 {
     let rank = (q * sorted.len() as f64).ceil() as usize;
     sorted[rank.clamp(1, sorted.len()) - 1]

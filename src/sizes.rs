@@ -1,4 +1,4 @@
-//! Every buffer size and group count, and the numbers that they follow from.
+//! Buffer sizes and group counts, and the numbers that determine them.
 
 use crate::config::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
@@ -7,27 +7,27 @@ use crate::layout::{
 };
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
 
-/// Visible points of a pixel at the most, where they are found once: glass splits the path while a slot is free.
+/// Maximum number of visible points of a pixel, if they are found once: glass splits the path while a slot is free.
 pub const PPM_SLOTS: u32 = 8;
-/// Spheres that photon paths are aimed at, at the most.
+/// Maximum number of target spheres of photon paths.
 pub const MOST_TARGETS: u32 = 32;
-/// Cells of the table that aims them, at the most.
+/// Maximum number of cells of the emission table.
 pub const MOST_EMISSION_CELLS: u32 = 4096;
-/// Photons that one launch of a gather that tests every photon looks at, below every known driver's loop limit.
+/// Number of photons in one launch of a gather that tests every photon, below the loop limit of all known drivers.
 pub const EXHAUSTIVE_RANGE: u32 = 16_000;
 /// Rounds of Lloyd's algorithm for the k-means clusters.
 pub const LLOYD_ROUNDS: u32 = 4;
-/// Visible points that an invocation of `gather_clustered.comp` has on a processor, a divisor of a tile's.
+/// Visible points per invocation of `gather_clustered.comp` on a CPU, a divisor of a tile's.
 const RUN_ON_CPU: u32 = 8;
 
-/// Visible points that an invocation of `gather_clustered.comp` has on a device of this kind.
+/// Visible points per invocation of `gather_clustered.comp` on a device of this kind.
 pub fn clustered_run(kind: &str) -> u32 {
     if kind == "cpu" { RUN_ON_CPU } else { 1 }
 }
 
-/// Radii that the mean of a grid's radii is taken of, about: their sum has to fit a u32.
+/// Approximate number of radii in the mean of a grid: their sum has to fit a u32.
 const RADIUS_SAMPLES: u32 = 1 << 16;
-/// Bits of a digit of the radix sort, at the most.
+/// Maximum number of bits of a digit of the radix sort.
 pub const SORT_DIGIT_BITS: u32 = 8;
 
 /// The head, the spheres, the cells.
@@ -53,7 +53,7 @@ pub struct Sizes {
     pub photon_capacity: u32,
     /// log2 of the grid's buckets.
     pub cell_bits: u32,
-    /// Launches among which a gather's photons are dealt: 1 unless the driver cuts its loops.
+    /// Number of launches of a gather, among which photons are distributed: 1 unless the driver cuts loops.
     pub gather_parts: u32,
     /// Visible points that an invocation of `gather_clustered.comp` has.
     pub clustered_run: u32,
@@ -61,22 +61,22 @@ pub struct Sizes {
     pub meshes: u32,
     /// Cells of all objects' grids.
     pub object_cells: u32,
-    /// 2 where caustic photons are gathered apart from the others, else 1.
+    /// 2 if caustic photons have a map of their own, otherwise 1.
     pub photon_maps: u32,
     /// Whether the scene has glossy surfaces.
     pub glossy: bool,
-    /// Photons of such a cell at the most.
+    /// Maximum number of photons of such a cell.
     pub cell_photons: Option<u32>,
     /// Whether photon paths are aimed.
     pub aimed: bool,
-    /// What a bench asks of the gathers.
+    /// Options of benches for gathers.
     pub probe: Probe,
 }
 
-/// What a bench asks of the gathers besides gathering.
+/// Options of benches for gathers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Probe {
-    /// Gathers that test every photon do so for every stride-th workgroup of visible points.
+    /// Gathers that test every photon process every stride-th workgroup of visible points.
     pub stride: u32,
     /// Whether the photons tested are counted.
     pub count_tests: bool,
@@ -91,12 +91,12 @@ impl Default for Probe {
     }
 }
 
-/// What of a device and a scene the sizes depend on.
+/// The limits of a device and properties of a scene that determine the sizes.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Bytes that one storage buffer binding can span.
     pub storage_buffer_bytes: u64,
-    /// Loop iterations that an invocation is given.
+    /// Loop iterations that an invocation may make.
     pub loop_limit: u32,
     /// Invocations that keep the device busy.
     pub lanes: u32,
@@ -114,12 +114,12 @@ pub struct Limits {
     pub object_cells: u32,
 }
 
-/// A quarter more, and some.
+/// A quarter more, with a margin.
 fn with_room(need: u32) -> u32 {
     need.saturating_add(need / 4 + 64)
 }
 
-/// Photons that a path leaves behind on average; more are noticed and make the buffers grow.
+/// Expected number of photons per path; if there are more, the buffers grow.
 const EXPECTED_PHOTONS: f64 = 5.0;
 
 impl Sizes {
@@ -151,7 +151,7 @@ impl Sizes {
             cell_bits: (batch_paths.ilog2() + 3).clamp(12, 24),
             meshes: limits.meshes,
             object_cells: limits.object_cells,
-            // The paper has one photon map, and so has a picture too large for the device to bind two.
+            // One photon map for the paper's estimator, and if the device can't bind two for this picture.
             photon_maps: match config.estimator {
                 Estimator::Sppm if limits.specular && two_maps <= limits.storage_buffer_bytes => 2,
                 _ => 1,
@@ -166,7 +166,7 @@ impl Sizes {
         sizes
     }
 
-    /// Deals the paths to about `lanes` invocations.
+    /// Distributes the paths over about `lanes` invocations.
     pub fn set_lanes(&mut self, lanes: u32) {
         self.photon_lanes = self.batch_paths.min(lanes.next_multiple_of(64));
         let paths = f64::from(self.paths_per_lane());
@@ -175,14 +175,13 @@ impl Sizes {
         self.photon_capacity = self.lane_photons();
     }
 
-    /// Makes the photons' buffers fit what a batch was seen to need, with room for chance: kernels have an invocation for
-    /// each place.
+    /// Fits the photon buffers to the measured need of a batch, with a margin: kernels have an invocation for each element.
     pub fn fit(&mut self, lane_need: u32, batch_need: u32) {
         self.lane_capacity = self.lane_capacity.min(lane_need + lane_need / 2 + 8);
         self.photon_capacity = with_room(batch_need).min(self.lane_photons());
     }
 
-    /// Makes room for what didn't fit.
+    /// Enlarges the buffers for photons that did not fit.
     pub fn grow(&mut self, lane_need: u32, batch_need: u32) {
         if lane_need > self.lane_capacity {
             self.lane_capacity = lane_need.saturating_add(lane_need / 4 + 1);
@@ -192,7 +191,7 @@ impl Sizes {
         }
     }
 
-    /// Takes fewer photon paths at once until the photons of a batch fit into one buffer.
+    /// Reduces the paths of a batch until its photons fit into one buffer.
     pub fn shrink_batch(&mut self, limits: &Limits) {
         let bytes =
             |sizes: &Self| u64::from(sizes.photon_lanes) * u64::from(sizes.lane_capacity) * size_of::<Photon>() as u64;
@@ -206,12 +205,12 @@ impl Sizes {
         self.photon_capacity = self.photon_capacity.min(self.lane_photons());
     }
 
-    /// Photon paths that an invocation follows one after the other, at the most.
+    /// Maximum number of photon paths of a lane.
     pub fn paths_per_lane(&self) -> u32 {
         self.batch_paths.div_ceil(self.photon_lanes)
     }
 
-    /// Bytes of the buffer `id`; `None` for those that hold the scene.
+    /// Size of the buffer `id` in bytes; `None` for buffers of the scene.
     pub fn bytes(&self, id: BufferId) -> Option<u64> {
         let pixels = u64::from(self.resolution[0]) * u64::from(self.resolution[1]);
         let slots = u64::from(self.slots());
@@ -219,7 +218,7 @@ impl Sizes {
         let photons = u64::from(self.photon_capacity);
         let lanes = u64::from(self.photon_lanes);
         let tiles = photons.max(slots).div_ceil(u64::from(SORT_TILE));
-        // One number more than tiles for each digit.
+        // One more element per digit than tiles.
         let histograms = (tiles + 1) << SORT_DIGIT_BITS;
         let cells = (1u64 << self.cell_bits) + 1;
         let (meshes, object_cells) = (u64::from(self.meshes), u64::from(self.object_cells) + 1);
@@ -272,13 +271,13 @@ impl Sizes {
         Some(count * size as u64)
     }
 
-    /// Workgroups of visible points of one mesh each, at the most.
+    /// Maximum number of workgroups of visible points of one mesh each.
     pub fn runs(&self) -> u32 {
-        // Every mesh's last one may be nearly empty.
+        // The last workgroup of each mesh may be nearly empty.
         self.slots().div_ceil(GROUP) + self.meshes.min(self.slots())
     }
 
-    /// Workgroups of visible points of one cluster each, at the most.
+    /// Maximum number of workgroups of visible points of one cluster each.
     pub fn order_groups(&self) -> u32 {
         self.slots().div_ceil(GROUP) + self.runs()
     }
@@ -288,22 +287,22 @@ impl Sizes {
         self.pixel_slots * self.slots_per_pixel
     }
 
-    /// What gathers photons: each slot for each photon map.
+    /// Receivers of photons: each slot for each photon map.
     pub fn receivers(&self) -> u32 {
         self.slots() * self.photon_maps
     }
 
-    /// Every how many receivers' radii the mean of a grid's radii is taken of: odd, so that it meets each of a pixel's slots.
+    /// Step between the receivers whose radii are averaged for a grid: odd, so that it includes all slots of a pixel.
     pub fn radius_step(&self) -> u32 {
         (self.receivers() / RADIUS_SAMPLES) | 1
     }
 
-    /// Photons that the lanes can store.
+    /// Number of photons that all lanes can store.
     pub fn lane_photons(&self) -> u32 {
         self.photon_lanes.saturating_mul(self.lane_capacity)
     }
 
-    /// Photon paths of a round that only tells where they should start, for iterations of `paths`.
+    /// Photon paths of a pilot round, for iterations of `paths`.
     pub fn pilot_paths(&self, paths: u32) -> u32 {
         paths.div_ceil(4).min(self.batch_paths)
     }

@@ -1,11 +1,10 @@
-//! What a stage is: data that says which shader runs, on how many invocations, with which constants. Knows no Vulkan.
+//! Descriptions of stages: shader, number of invocations, constants. Independent of Vulkan.
 
 use std::borrow::Cow;
 
 /// Every buffer that a shader can name. A block `Photons` in GLSL is the buffer `BufferId::Photons`.
 ///
-/// The last group has no memory of its own: these are formal parameters of stages that serve several buffers, and a
-/// [`StageDesc`] says which buffer each stands for.
+/// The last group has no memory: these are formal parameters of stages that serve several buffers; a [`StageDesc`] binds them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum BufferId {
     /// [`crate::layout::Settings`].
@@ -32,15 +31,15 @@ pub enum BufferId {
     NearLights,
     /// [`crate::layout::LightSource`]s.
     LightSources,
-    /// Names of the media that each light is in: see `packing/immersion.rs`.
+    /// The media that each light is in: see `packing/immersion.rs`.
     MediaOfLights,
-    /// What shines from afar, and how directions are chosen from it; see `glsl/lights/environment.glsl`.
+    /// The environment and its sampling table; see `glsl/lights/environment.glsl`.
     Environment,
-    /// Where aimed photon paths start; see [`crate::emission::Table::texels`].
+    /// The sampling table of aimed photon paths; see [`crate::emission::Table::texels`].
     EmissionTable,
     /// [`crate::layout::PathStart`] of each photon path of a batch.
     PathStarts,
-    /// What each path of an iteration's first batch was worth, u32; see `glsl/stages/photons.comp`.
+    /// The value of each path of an iteration's first batch, u32; see `glsl/stages/photons.comp`.
     PathValues,
     /// [`crate::layout::VisiblePoint`]s in slot order.
     VisiblePoints,
@@ -62,11 +61,11 @@ pub enum BufferId {
     Sequence3Sums,
     /// [`crate::layout::Coverage`] of each slot, for each photon map.
     CoverageOf,
-    /// Side of each slot's pixel where its visible point is, f32.
+    /// Footprint of each slot's pixel at its visible point, f32.
     Footprints,
-    /// R² that each slot gathers within in this iteration, f32, for each photon map.
+    /// R² of each slot in this iteration, f32, for each photon map.
     Radii2,
-    /// What visible points want of photons in each cell, f32; see `glsl/gather/demand.glsl`.
+    /// Demand for photons in each cell, f32; see `glsl/gather/demand.glsl`.
     Demand,
     /// [`crate::layout::ShellRadii`] of each photon map's shells.
     RadiiOfShells,
@@ -92,9 +91,9 @@ pub enum BufferId {
     ObjectGrids,
     /// First photon of each cell of the objects' grids and, past the last one, the number of photons, u32.
     ObjectCells,
-    /// Photons that have a place in each of those cells, u32.
+    /// Number of photons stored in each of those cells, u32.
     ObjectCellCursors,
-    /// Slots in the order of the workgroups that gather for them, u32; [`crate::layout::NO_SLOT`] for fillers.
+    /// Slots in the order of the gather's workgroups, u32; [`crate::layout::NO_SLOT`] for fillers.
     PointOrder,
     /// Slots by mesh and along a curve within it, u32; [`crate::layout::NO_SLOT`] for fillers.
     MeshOrder,
@@ -118,31 +117,32 @@ pub enum BufferId {
     ClusterSizes,
     /// First place of each cluster in [`BufferId::PointOrder`], u32.
     ClusterStarts,
-    /// What a kernel copies to find out how fast the memory is.
+    /// Source of the copy that measures memory bandwidth.
     ProbeFrom,
-    /// Where it copies it to.
+    /// Destination of that copy.
     ProbeTo,
-    /// Photons tested for each slot, for each photon map, u32, where they are counted; the highest bit says that the slot had its turn.
+    /// Photons tested for each slot, for each photon map, u32, if they are counted; the highest bit marks slots that were
+    /// processed.
     TestsOf,
     /// Sort keys, u32.
     Keys,
-    /// What is sorted by [`BufferId::Keys`], u32.
+    /// Values that are sorted by [`BufferId::Keys`], u32.
     Values,
     /// Sort keys after every other pass.
     OtherKeys,
     /// Values after every other pass.
     OtherValues,
-    /// Digit counts of a sort pass, u32, `[digit][tile]`, and past the last tile those of all.
+    /// Digit counts of a sort pass, u32, `[digit][tile]`, and behind the last tile the totals.
     Histograms,
     /// Block sums of a prefix sum, u32.
     ScanSums,
-    /// Sum of all that a prefix sum went over, one u32.
+    /// Total of a prefix sum, one u32.
     ScanTotal,
     /// RGBA f32 picture, row-major from the top left.
     Film,
     /// [`crate::layout::BehindGlass`] of each pixel, row-major from the top left.
     GlassFilm,
-    /// As [`BufferId::Film`], by the iterations of a sequence alone.
+    /// As [`BufferId::Film`], of the iterations of one sequence.
     Sequence0Film,
     /// Likewise of the next one.
     Sequence1Film,
@@ -153,7 +153,7 @@ pub enum BufferId {
     /// [`crate::layout::StatusCounters`].
     Status,
 
-    /// Parameter: the numbers that a prefix sum is taken of.
+    /// Parameter: the numbers of a prefix sum.
     Scan,
     /// Parameter: one of [`SEQUENCE_SUMS`].
     SequenceSums,
@@ -161,9 +161,9 @@ pub enum BufferId {
     SequenceFilm,
     /// Parameter: the photons that are gathered.
     GatheredFrom,
-    /// Parameter: the order that is made.
+    /// Parameter: the order that is written.
     OrderOut,
-    /// Parameter: how many keys to sort, one u32.
+    /// Parameter: number of keys to sort, one u32.
     SortCount,
     /// Parameter: keys before a sort pass.
     KeysIn,
@@ -265,8 +265,8 @@ pub struct SpecConstant {
     pub name: &'static str,
 }
 
-/// The constant that chooses [`Shader::ray_query`]. It is none of the shader's own, since it can't be one: a device without ray
-/// queries can't load the module that has them.
+/// The pseudo-constant that chooses [`Shader::ray_query`]. It can't be a specialisation constant: a device without ray queries
+/// can't load a module that contains them.
 pub const RAY_QUERY: &str = "RAY_QUERY";
 
 /// A compiled stage, as `build.rs` describes it.
@@ -276,13 +276,13 @@ pub struct Shader {
     pub name: &'static str,
     /// SPIR-V, little endian.
     pub spirv: &'static [u8],
-    /// The same with rays that the device traces itself, where the stage traces any: see [`RAY_QUERY`].
+    /// The same with ray queries, if the stage traces rays: see [`RAY_QUERY`].
     pub ray_query: Option<&'static [u8]>,
     /// Invocations of a workgroup.
     pub workgroup: u32,
-    /// What it binds.
+    /// The buffers that it binds.
     pub bindings: &'static [Binding],
-    /// Its push constants, where it has any.
+    /// Its push constants, if any.
     pub push_constants: Option<StructLayout>,
     /// Its specialisation constants.
     pub constants: &'static [SpecConstant],
@@ -299,7 +299,7 @@ impl Shader {
 /// A launch of a stage.
 #[derive(Debug, Clone)]
 pub struct StageDesc {
-    /// What runs.
+    /// The shader.
     pub shader: &'static Shader,
     /// Invocations, rounded up to whole workgroups.
     pub threads: u32,
@@ -307,7 +307,7 @@ pub struct StageDesc {
     pub constants: Cow<'static, [(&'static str, u32)]>,
     /// Bytes of the push constants.
     pub push: Vec<u8>,
-    /// Which buffer a formal parameter stands for.
+    /// The buffers bound to formal parameters.
     pub bound: Cow<'static, [(BufferId, BufferId)]>,
 }
 
@@ -323,7 +323,7 @@ impl StageDesc {
         }
     }
 
-    /// The module with rays that the device traces itself, if that is the one to run.
+    /// The module with ray queries, if that is the one to run.
     pub fn ray_query(&self) -> Option<&'static [u8]> {
         let asked = self
             .constants

@@ -1,14 +1,14 @@
-//! Text as people read it.
+//! Text for terminals and messages.
 
 use std::fmt::Write as _;
 
-/// `text` with what would move a terminal's cursor, change its state or turn the direction of writing as `\u001b` and the like, as
-/// in JSON. Names in files may have such characters, and names of files, and of devices.
+/// `text` with control characters escaped as in JSON (`\u001b`): those that move a terminal's cursor, change its state or the
+/// direction of writing. Names in files may contain such characters, and names of files and of devices.
 pub fn escaped(text: &str) -> String {
     escape(text, false)
 }
 
-/// The same, but lines end where they end.
+/// The same, but line ends are kept.
 pub fn escaped_lines(text: &str) -> String {
     escape(text, true)
 }
@@ -32,13 +32,14 @@ fn is_hidden(character: char) -> bool {
         || matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// How many items a list in a message spells out.
+/// Maximum number of items in a list of a message.
 const MAX_LISTED: usize = 8;
 
-/// Characters of a name or URI that are kept: a file may hold megabytes of them, and repeat them per instance.
+/// Maximum number of characters of a name or URI in a message: a file may contain megabytes of them, and repeat them per
+/// instance.
 const MAX_NAME: usize = 120;
 
-/// `name`, cut where it is longer than any sensible name.
+/// `name`, truncated if it is longer than any sensible name.
 pub(crate) fn shorten(name: &str) -> String {
     match name.char_indices().nth(MAX_NAME) {
         Some((end, _)) => format!("{}…", &name[..end]),
@@ -61,7 +62,7 @@ pub(crate) fn list(items: &[String]) -> String {
     }
 }
 
-/// A number of bytes with three digits or so: one that isn't 0 isn't told as 0.
+/// A number of bytes with about three digits: a positive number is never shown as 0.
 pub fn bytes(count: u64) -> String {
     match count {
         0..1024 => format!("{count} bytes"),

@@ -1,19 +1,19 @@
-//! Settings that have a few named values.
+//! Settings with named values.
 
 use std::fmt;
 
-/// A setting that has a few named values: what a program needs to offer them.
+/// A setting with named values, for programs that offer it.
 pub trait Choice: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
     /// All of them.
     const ALL: &'static [Self];
 
-    /// Its name, in small letters.
+    /// Its name, in lower case.
     fn name(self) -> &'static str;
 
-    /// What it means, in a line.
+    /// Its summary, in a line.
     fn summary(self) -> &'static str;
 
-    /// The value of that name.
+    /// The value with that name.
     fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|choice| choice.name() == name)
     }

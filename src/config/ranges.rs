@@ -1,5 +1,5 @@
-//! The values that settings may have, for arguments and for [`RenderConfig::check`](super::RenderConfig::check) alike. Each
-//! gives the value back, or says what it must be.
+//! Ranges of settings, for arguments and for [`RenderConfig::check`](super::RenderConfig::check). Each function returns the
+//! value, or a text that says what it must be.
 
 use super::MAX_SIDE;
 
@@ -16,7 +16,7 @@ pub fn resolution(sides: [u32; 2]) -> Checked<[u32; 2]> {
     checked(sides, fits, || format!("each side must lie between 1 and {MAX_SIDE}"))
 }
 
-/// How many there are of what there must be at least one of.
+/// A count of at least one.
 pub fn count(count: u32) -> Checked<u32> {
     checked(count, count > 0, || "must be at least 1".to_owned())
 }
@@ -28,7 +28,7 @@ pub fn alpha(alpha: f32) -> Checked<f32> {
     })
 }
 
-/// A length, or another quantity that has no sense at 0.
+/// A length, or another quantity above 0.
 pub fn positive(value: f64) -> Checked<f64> {
     checked(value, value > 0.0 && value.is_finite(), || {
         "must be above 0 and finite".to_owned()

@@ -2,8 +2,8 @@
 
 use crate::layout::TILE;
 
-/// The pixel of a slot, `None` where the tile reaches over the picture's edge. Tiles lie row by row; within a tile the
-/// bits of the number inside are, from the lowest, x0 x1 y0 x2 y1 y2.
+/// The pixel of a slot, `None` if it lies outside of the picture. Tiles lie row by row; within a tile the bits of the number
+/// inside are, from the lowest, x0 x1 y0 x2 y1 y2.
 pub fn pixel_of(resolution: [u32; 2], pixel_slot: u32) -> Option<[u32; 2]> {
     let tiles_across = resolution[0].div_ceil(TILE);
     let (tile, inside) = (pixel_slot / (TILE * TILE), pixel_slot % (TILE * TILE));

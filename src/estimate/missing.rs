@@ -1,21 +1,19 @@
-//! Light behind glass that no photon has brought yet.
-//!
-//! A ray to a light that ends on glass says what the light would bring if the glass didn't bend it. Photons alone say where it
-//! goes. Until they do, a pixel that would have such light doesn't know its error: what of it hasn't arrived counts. It knows
-//! where so many photons would have come, had the glass bent none, that their number says something; or where those that
-//! came near brought a part of it: glass that focuses light leaves most of its shadow without a photon for ever.
+//! Light behind glass that no photon has carried yet. A shadow ray that ends on glass estimates the light without refraction.
+//! Only photons show where the light really goes. Until they do, the error of a pixel that might have such light is unknown: the
+//! part that has not arrived counts as error. The pixel is decided if enough photons would have arrived without refraction for
+//! their number to be significant; or if photons near it carried a part of the light: glass that focuses light leaves most of its
+//! shadow without photons forever.
 
 use crate::layout::BehindGlass;
 
-/// Photons that would have come without a bend, from which on that they didn't says that the light goes elsewhere.
+/// Expected number of photons without refraction, from which on their absence means that the light goes elsewhere.
 const TELLING: f64 = 4.0;
-/// Part of the light that would fall without a bend on pixels which lie together: if as much has arrived in them, it is found.
+/// Share of the unrefracted light of a neighbourhood of pixels: if that much has arrived there, the light is found.
 const FOUND: f64 = 0.25;
-/// Photons in one pixel that this takes, so that it isn't chance.
+/// Minimum number of photons in one pixel for that, so that it is significant.
 const FOUND_BY: f32 = 16.0;
 
-/// Radiance that each pixel may lack. `photon` is the radiance that one of all that were emitted would bring a white surface,
-/// times R².
+/// Radiance that each pixel may lack. `photon` is the radiance of a white surface by one of all emitted photons, times R².
 pub(super) fn missing(pixels: &[BehindGlass], width: usize, photon: f64) -> Vec<f64> {
     if pixels.iter().all(|pixel| pixel.unbent <= 0.0) {
         return vec![0.0; pixels.len()];
@@ -34,7 +32,7 @@ pub(super) fn missing(pixels: &[BehindGlass], width: usize, photon: f64) -> Vec<
     pixels.iter().enumerate().map(of_pixel).collect()
 }
 
-/// Sums of the unbent light over all pixels above and to the left.
+/// Sums of the unrefracted light over all pixels above and to the left.
 struct Sums {
     width: usize,
     height: usize,
@@ -53,7 +51,7 @@ impl Sums {
         Self { width, height, sums }
     }
 
-    /// The mean over a square of this radius; past the picture's edge there is none.
+    /// The mean over a square of this radius; 0 outside of the picture.
     fn around(&self, pixel: usize, radius: f32) -> f64 {
         let reach = (f64::from(radius).min(1e6)).round() as usize;
         let range = |at: usize, side: usize| (at.saturating_sub(reach), (at + reach + 1).min(side));
@@ -67,7 +65,7 @@ impl Sums {
     }
 }
 
-/// Whether the light of each pixel, and of those that lie together with it, has been found.
+/// Whether the light of each pixel and its neighbourhood has been found.
 fn found(pixels: &[BehindGlass], width: usize) -> Vec<bool> {
     let height = pixels.len() / width;
     let mut is_seen: Vec<bool> = pixels.iter().map(|pixel| pixel.unbent <= 0.0).collect();

@@ -1,22 +1,22 @@
-//! The squared errors of each pixel, and the relative error of the picture that they make.
+//! The squared errors of each pixel, and their sum, the relative error of the picture.
 
 use rayon::prelude::*;
 
-/// Squared second difference of pixels seen through their centres, along rows and columns together, over the squared error
-/// that this makes of them: an upright edge of height h leaves two differences of h, and a pixel that it cuts, evenly spread,
-/// is off by h²/12 in the mean. A slanted edge has 40, a line thinner than a pixel 6.
+/// Ratio of the squared second differences along rows and columns to the squared error, for pixels sampled at their centres: a
+/// vertical edge of height h leaves two differences of h, and the mean squared error of a pixel that it crosses at a uniform
+/// position is h²/12. A slanted edge has 40, a line thinner than a pixel 6.
 const BEND_OVER_CENTRE: f64 = 24.0;
 
-/// What the picture and those of its sequences say of its errors.
+/// The errors of a picture, from the pictures of its sequences.
 #[derive(Debug)]
 pub(super) struct Parts {
     pub width: usize,
     pub pixels: Vec<OfPixel>,
-    /// relMSE's denominator beside the square.
+    /// relMSE's denominator without the square.
     pub floor: f64,
-    /// Whether pixels are seen through their centres alone.
+    /// Whether pixels are sampled at their centres only.
     pub sees_centres: bool,
-    /// Radiance behind glass that each pixel may lack; of no pixel where nothing is known of it.
+    /// Radiance behind glass that each pixel may lack; empty if it is not estimated.
     pub missing: Vec<f64>,
 }
 
@@ -29,11 +29,11 @@ pub(super) struct OfPixel {
     pub noise2: [f64; 3],
     /// The same, over relMSE's denominator.
     pub relative_noise2: [f64; 3],
-    /// What of the squared errors is only that one photon might have come.
+    /// The part of the squared errors that is the contribution of one photon that might have arrived.
     pub photon2: f64,
-    /// Squared bias of the mean of the channels; of noise alone it is 0 on average.
+    /// Squared bias of the mean of the channels; 0 on average for pure noise.
     pub bias2: f64,
-    /// What the pixel has without the light that R brings it beyond doubt, as a part of what it has.
+    /// The pixel's value without the light that R certainly blurs into it, as a share of its value.
     pub own: f64,
 }
 
@@ -42,13 +42,13 @@ impl Parts {
         1.0 / (3 * self.pixels.len()) as f64
     }
 
-    /// Part of relMSE of the noise.
+    /// Contribution of noise to relMSE.
     pub fn relative_noise2(&self) -> f64 {
         let parts = self.pixels.iter().flat_map(|pixel| pixel.relative_noise2);
         parts.sum::<f64>() * self.per_sample()
     }
 
-    /// Part of relMSE of the bias.
+    /// Contribution of bias to relMSE.
     pub fn relative_bias2(&self) -> f64 {
         self.relative_of(&self.bias2())
     }
@@ -57,12 +57,12 @@ impl Parts {
         self.pixels.iter().map(|pixel| pixel.bias2).collect()
     }
 
-    /// Part of relMSE of what lies beside the centres of pixels.
+    /// Contribution of aliasing to relMSE.
     pub fn relative_aliasing2(&self) -> f64 {
         self.aliasing2().1
     }
 
-    /// Part of relMSE of light that is missing. The truth has it.
+    /// Contribution of missing light to relMSE; the reference would include it.
     pub fn relative_missing2(&self) -> f64 {
         let of_pixel = |(pixel, missing): (&OfPixel, &f64)| {
             let of_channel = |value: f64| missing.powi(2) / ((value + missing).powi(2) + self.floor);
@@ -71,7 +71,7 @@ impl Parts {
         self.pixels.iter().zip(&self.missing).map(of_pixel).sum::<f64>() * self.per_sample()
     }
 
-    /// Part of relMSE of what one photon would have brought pixels that had none, and their share.
+    /// Contribution to relMSE of pixels without photons, as if they had received one, and their share.
     pub fn without_photons(&self) -> (f64, f64) {
         let waiting = self.pixels.iter().filter(|pixel| pixel.photon2 > 0.0);
         let (mut relative2, mut count) = (0.0, 0);
@@ -83,10 +83,10 @@ impl Parts {
         (relative2, f64::from(count) / self.pixels.len() as f64)
     }
 
-    /// Of all parts together, each pixel's squared error.
+    /// Each pixel's squared error, of all parts together.
     pub fn of_pixels(&self) -> Vec<[f64; 3]> {
-        // A pixel's own bias is all but lost in noise. What noise made negative is missing: without the scale the picture's
-        // error were smaller than that of its pixels.
+        // A pixel's own bias is dominated by noise. Negative estimates are clamped, so a scale keeps the sum equal to the
+        // picture's error.
         let bias2 = self.bias2();
         let around: Vec<f64> = sums_around(&bias2, self.width)
             .into_iter()
@@ -115,7 +115,7 @@ impl Parts {
             .collect()
     }
 
-    /// relMSE of these squared biases of the channels' means.
+    /// relMSE of squared biases of the channels' means.
     fn relative_of(&self, bias2: &[f64]) -> f64 {
         let of_pixel = |(pixel, bias2): (&OfPixel, &f64)| {
             let shares = share2(&pixel.values).into_iter().zip(pixel.values);
@@ -127,8 +127,8 @@ impl Parts {
         self.pixels.iter().zip(bias2).map(of_pixel).sum::<f64>() * self.per_sample()
     }
 
-    /// Squared error of each pixel that is seen through its centre alone, from the second differences to its neighbours, and
-    /// its part of relMSE. Those of noise are subtracted, so that some are negative.
+    /// Squared error of each pixel sampled at its centre only, from the second differences to its neighbours, and its
+    /// contribution to relMSE. The differences by noise are subtracted, so some are negative.
     fn aliasing2(&self) -> (Vec<[f64; 3]>, f64) {
         let mut of_pixels = vec![[0.0; 3]; self.pixels.len()];
         if !self.sees_centres {
@@ -155,13 +155,13 @@ impl Parts {
     }
 }
 
-/// A channel's bias is in proportion to its value; its square over the pixel's.
+/// A channel's bias is proportional to its value; its square over that of the pixel.
 fn share2(values: &[f64; 3]) -> [f64; 3] {
     let mean = values.iter().sum::<f64>() / 3.0;
     values.map(|value| if mean > 0.0 { (value / mean).powi(2) } else { 0.0 })
 }
 
-/// What brings a sum of parts that were negative back to its signed value.
+/// The scale that restores the signed sum after negative parts were clamped.
 fn scale(signed: f64, positive: f64) -> f64 {
     if positive > 0.0 {
         signed.max(0.0) / positive
@@ -170,7 +170,7 @@ fn scale(signed: f64, positive: f64) -> f64 {
     }
 }
 
-/// Sum over the pixels that are no more than two columns or rows away, each one itself among them, and their number.
+/// Sum over the pixels within two columns and rows, including the pixel itself, and their number.
 pub(super) fn sums_around(values: &[f64], width: usize) -> Vec<(f64, usize)> {
     const REACH: usize = 2;
     let height = values.len() / width;

@@ -1,15 +1,15 @@
-//! What a pixel has by each sequence alone.
+//! The value of a pixel by each sequence.
 
 use crate::config::{SEQUENCES, iterations_of};
 
 const COUNT: usize = SEQUENCES as usize;
 
-/// The part of the iterations that each sequence has had.
+/// The share of the iterations of each sequence.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Weights([f64; COUNT]);
 
 impl Weights {
-    /// After so many iterations.
+    /// After this number of iterations.
     pub fn of(iterations: u32) -> Self {
         let of_sequence =
             |sequence: usize| f64::from(iterations_of(sequence as u32, iterations)) / f64::from(iterations);
@@ -17,7 +17,7 @@ impl Weights {
     }
 }
 
-/// A pixel's value by the iterations of each sequence.
+/// A pixel's value by each sequence.
 pub(super) struct Spread {
     weights: [f64; COUNT],
     values: [f64; COUNT],
@@ -35,7 +35,7 @@ impl Spread {
         let of_sequence =
             |(&weight, &value): (&f64, &f64)| (weight * (value - self.mean)).powi(2) / divisor(weight, value);
         let squares: f64 = self.weights.iter().zip(&self.values).map(of_sequence).sum();
-        // What the spread lacks since the mean is that of the values themselves.
+        // Correction of the spread, because the mean is that of the same values.
         squares / (1.0 - self.weights.iter().map(|weight| weight * weight).sum::<f64>())
     }
 
@@ -44,9 +44,9 @@ impl Spread {
         self.noise2_over(|_, _| 1.0)
     }
 
-    /// The same over relMSE's denominator. Light that comes seldom and is bright makes a pixel far too bright: over that
-    /// value's square its error would seem small. Each sequence's part is therefore over what the other ones have of the
-    /// pixel, or the pixels around it if that is more, if it is less than what all have.
+    /// The same over relMSE's denominator. Rare bright contributions make a pixel far too bright: relative to that value's square
+    /// its error would seem small. So each sequence's share is divided by the value of the other sequences, or of the surrounding
+    /// pixels if that is larger, if that is less than the value of all.
     pub fn relative_noise2(&self, around: f64, floor: f64) -> f64 {
         self.noise2_over(|weight, value| {
             let others = (self.mean - weight * value) / (1.0 - weight);
