@@ -1,4 +1,4 @@
-//! Animations at a time: which properties of nodes they set, and to what (glTF 2.0, section 3.11).
+//! Animations at a time: the properties of nodes that they set (glTF 2.0, section 3.11).
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,13 +14,13 @@ use super::file::document::Document;
 use super::graph::node_label;
 use crate::text::list;
 
-/// What animations set, by node.
+/// Properties set by animations, by node.
 #[derive(Default)]
 pub(crate) struct Pose<'a> {
     nodes: HashMap<usize, NodePose<'a>>,
 }
 
-/// What animations set of a node; the rest is as the file has it.
+/// Properties of a node set by animations; the others are those of the file.
 #[derive(Default)]
 pub(crate) struct NodePose<'a> {
     pub translation: Option<DVec3>,
@@ -71,7 +71,7 @@ impl<'a> Pose<'a> {
         self.nodes.get(&index)
     }
 
-    /// Sets what a channel animates. Returns node and property, or `None` if there is nothing to set.
+    /// Sets the property that a channel animates. Returns node and property, or `None` if there is nothing to set.
     fn apply(
         &mut self,
         document: &'a Document,
@@ -133,7 +133,7 @@ impl<'a> Pose<'a> {
     }
 }
 
-/// Number of morph targets of the mesh at a node: all its primitives have as many.
+/// Number of morph targets of the mesh at a node, equal for all its primitives.
 fn morph_targets(root: &Root, node: usize) -> usize {
     let mesh = root.nodes[node].mesh.and_then(|mesh| root.meshes.get(mesh.value()));
     let primitives = mesh.into_iter().flat_map(|mesh| &mesh.primitives);

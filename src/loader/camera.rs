@@ -1,4 +1,4 @@
-//! Cameras, and the one that stands in where the file has none.
+//! Cameras, and the default camera for files that have none.
 
 use std::f64::consts::PI;
 
@@ -49,7 +49,7 @@ pub(crate) fn cameras(
     Ok(cameras)
 }
 
-/// What the camera shows, and width over height where the file gives it. Clipping planes play no part.
+/// The camera's projection, and width over height if the file gives it. Clipping planes are ignored.
 fn projection(camera: &gltf_json::Camera, normalisation: Normalisation) -> Check<(Projection, Option<f32>)> {
     match camera.type_ {
         Checked::Valid(Type::Orthographic) => match &camera.orthographic {
@@ -83,7 +83,7 @@ fn of_perspective(perspective: &Perspective) -> Check<(Projection, Option<f32>)>
     Ok((Projection::Perspective { tan_half_fov }, perspective.aspect_ratio))
 }
 
-/// Negative magnifications, which the specification discourages, are taken by their size.
+/// Negative magnifications, which the specification discourages, count by their absolute value.
 fn of_orthographic(orthographic: &Orthographic, normalisation: Normalisation) -> Check<(Projection, Option<f32>)> {
     let [width, height] = [orthographic.xmag, orthographic.ymag].map(f32::abs);
     let half_height = (f64::from(height) * normalisation.scale) as f32;
@@ -99,8 +99,8 @@ fn of_orthographic(orthographic: &Orthographic, normalisation: Normalisation) ->
 
 /// The camera at a node; `None` if the node's transform leaves it no direction.
 ///
-/// Lengths of axes are ignored. Ancestors that mirror turn the direction of view with the scene, but the picture stays
-/// right-handed: that is what splitting the global transform into translation, rotation and scale gives.
+/// Lengths of axes are ignored. Ancestors that mirror turn the direction of view with the scene, but the picture remains
+/// right-handed, as if the global transform were split into translation, rotation and scale.
 fn place(
     name: String,
     (projection, aspect): (Projection, Option<f32>),

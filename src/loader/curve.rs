@@ -10,22 +10,22 @@ use super::diagnostic::{Check, damaged};
 use super::file::accessor::{FLOATS, Formats, Vectors};
 use super::file::document::Document;
 
-/// Where a time lies between the keyframes of a sampler.
+/// The position of a time between the keyframes of a sampler.
 #[derive(Clone, Copy)]
 pub(crate) struct Keyframes {
     count: usize,
-    /// The last one that isn't later, or the first.
+    /// The last keyframe that is not later, or the first.
     before: usize,
-    /// The one after it; the same before the first and after the last.
+    /// The next keyframe; the same before the first and after the last.
     after: usize,
-    /// How far the time is on the way, 0 to 1.
+    /// Position of the time between them, 0 to 1.
     fraction: f64,
-    /// Seconds from one to the other.
+    /// Seconds between them.
     interval: f64,
 }
 
 impl Keyframes {
-    /// Finds `time` in a sampler. `checked` has the accessors of times that are known to increase.
+    /// Finds `time` in a sampler. `checked` contains the accessors of times that have been checked to increase.
     pub(crate) fn at(document: &Document, sampler: &Sampler, time: f64, checked: &mut HashSet<usize>) -> Check<Self> {
         let fail = |what: String| format!("input, {what}");
         let times = Vectors::<1>::open(document, sampler.input, &FLOATS).map_err(fail)?;
@@ -37,7 +37,7 @@ impl Keyframes {
             let mut last = f64::NEG_INFINITY;
             for key in 0..count {
                 let [next] = times.get(key);
-                // Not a number isn't later either.
+                // NaN is not later either.
                 if !(next > last && next.is_finite()) {
                     return Err(damaged(format_args!(
                         "keyframe {key} is at {next} seconds, after one at {last}"
@@ -73,7 +73,7 @@ impl Keyframes {
     }
 }
 
-/// What a sampler gives at a time: `width` vectors of `N` numbers.
+/// The output of a sampler at a time: `width` vectors of `N` numbers.
 pub(crate) struct Curve<'a, const N: usize> {
     keyframes: Keyframes,
     interpolation: Interpolation,
@@ -81,13 +81,13 @@ pub(crate) struct Curve<'a, const N: usize> {
     width: usize,
 }
 
-/// The three outputs of a keyframe of a cubic spline; other interpolations have the value alone.
+/// The three outputs of a keyframe of a cubic spline; other interpolations have only the value.
 const IN_TANGENT: usize = 0;
 const VALUE: usize = 1;
 const OUT_TANGENT: usize = 2;
 
 impl<'a, const N: usize> Curve<'a, N> {
-    /// Opens the output of a sampler, of which each keyframe has `width` vectors.
+    /// Opens the output of a sampler with `width` vectors per keyframe.
     pub(crate) fn open(
         document: &'a Document,
         sampler: &Sampler,

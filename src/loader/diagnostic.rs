@@ -1,4 +1,4 @@
-//! The wording of errors and warnings about a scene file: one line each, whatever the names in the file look like.
+//! Texts of errors and warnings about a scene file: one line each, for any names in the file.
 
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -8,10 +8,10 @@ use gltf_json::Mesh;
 use crate::scene::Remark;
 use crate::text::quote;
 
-/// Result of a step of loading. The message says what is wrong, where and what to do; `Scene::load` adds the path.
+/// Result of a step of loading. The message says what is wrong, where and how to fix it; `Scene::load` adds the path.
 pub(crate) type Check<T> = std::result::Result<T, String>;
 
-/// Where something is in the file: `mesh 3 "floor"`.
+/// The location of an item in the file: `mesh 3 "floor"`.
 pub(crate) fn label(kind: &str, index: usize, name: Option<&str>) -> String {
     match name {
         Some(name) => format!("{kind} {index} {}", quote(name)),
@@ -38,12 +38,12 @@ pub(crate) struct Warnings {
 }
 
 impl Warnings {
-    /// Adds a line unless it is there already, as it is for a mesh that several nodes show.
+    /// Adds a line unless it is present already, as for a mesh of several nodes.
     pub(crate) fn push(&mut self, text: String) {
         self.add(text.into());
     }
 
-    /// The same of a remark.
+    /// The same for a remark.
     pub(crate) fn add(&mut self, warning: Remark) {
         if self.seen.insert(warning.text().to_owned()) {
             self.lines.push(warning);

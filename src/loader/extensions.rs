@@ -1,4 +1,4 @@
-//! Names of glTF extensions, those that `gltf` has no feature for.
+//! Names of glTF extensions without a feature of the `gltf` crate.
 
 pub(crate) const BASISU: &str = "KHR_texture_basisu";
 pub(crate) const CLEARCOAT: &str = "KHR_materials_clearcoat";

@@ -1,4 +1,4 @@
-//! The node hierarchy: which nodes the scene shows, and where in the world they stand.
+//! The node hierarchy: the nodes of a scene and their transforms to world space.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use gltf_json::{Node, Root};
@@ -8,10 +8,10 @@ use super::diagnostic::{Check, damaged, label};
 use super::scenes;
 use crate::scene::Remark;
 
-/// How far the last row of a node's matrix may be from 0 0 0 1.
+/// Tolerance of the last row of a node's matrix, 0 0 0 1.
 const AFFINE_TOLERANCE: f64 = 1e-5;
 
-/// A node of the scene with its place in the world.
+/// A node of the scene with its global transform.
 pub(crate) struct PlacedNode<'a> {
     /// Index in the file.
     pub index: usize,
@@ -19,13 +19,13 @@ pub(crate) struct PlacedNode<'a> {
     pub node: &'a Node,
     /// From the node's space to world space.
     pub to_world: DAffine3,
-    /// The same without the node's own scale, as a camera wants it.
+    /// The same without the node's own scale, for cameras.
     pub unscaled_to_world: DAffine3,
 }
 
-/// Every node of a scene, as [`scenes::choose`] has it, parents before children, in the file's order of depth first.
+/// Every node of the scene chosen by [`scenes::choose`], parents before children, depth first in the file's order.
 ///
-/// Without any scene all nodes that have no parent.
+/// Without a scene, all trees of nodes.
 pub(crate) fn place_nodes<'a>(
     root: &'a Root,
     pose: &Pose<'_>,
@@ -34,7 +34,7 @@ pub(crate) fn place_nodes<'a>(
 ) -> Check<Vec<PlacedNode<'a>>> {
     let parents = check_forest(root)?;
     let scene = scenes::choose(root, &parents, scene, notes)?;
-    // The last of the stack is next: siblings are pushed in reverse. Recursion would overflow on a long chain.
+    // Siblings are pushed in reverse. Recursion would overflow on a long chain.
     let mut stack: Vec<(usize, DAffine3)> = scene_roots(root, &parents, scene)?
         .into_iter()
         .rev()
@@ -93,7 +93,7 @@ fn check_forest(root: &Root) -> Check<Vec<Option<usize>>> {
             }
         }
     }
-    // With one parent each, exactly the nodes on and below a cycle can't be reached from a node without a parent.
+    // Since each has one parent, the nodes that can't be reached from a root are exactly those on and below cycles.
     let mut reached: Vec<bool> = parents.iter().map(Option::is_none).collect();
     let mut stack: Vec<usize> = (0..reached.len()).filter(|&index| reached[index]).collect();
     while let Some(index) = stack.pop() {
@@ -136,12 +136,12 @@ fn scene_roots(root: &Root, parents: &[Option<usize>], scene: Option<usize>) -> 
 /// A node's transform relative to its parent.
 struct LocalTransform {
     full: DAffine3,
-    /// Without the scale, where translation, rotation and scale are given apart.
+    /// Without the scale, if translation, rotation and scale are given separately.
     unscaled: DAffine3,
 }
 
 impl LocalTransform {
-    /// As the file has it, but for what an animation sets.
+    /// The file's values, except those set by an animation.
     fn of(node: &Node, pose: Option<&NodePose<'_>>) -> Check<Self> {
         if let Some(matrix) = &node.matrix {
             let full = affine_from(matrix.map(f64::from))?;

@@ -1,4 +1,4 @@
-//! `KHR_lights_punctual`: lights that are points or directions.
+//! `KHR_lights_punctual`: point, spot and directional lights.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,11 +12,10 @@ use super::diagnostic::{Check, Warnings, damaged, label};
 use super::graph::{PlacedNode, node_label};
 use crate::scene::{LightKind, Normalisation, PunctualLight};
 
-/// A spot's cone is no narrower than this between its edges, as a part of its 1 − cos: exporters write edges that are as
-/// good as the same.
+/// Minimum relative width of the falloff of a spot, in terms of 1 − cos: exporters write angles that are nearly equal.
 const NARROWEST_EDGE: f64 = 1e-4;
 
-/// Below and above that, in render units, a light's radius is none or refused.
+/// Range of a light's radius, in render units: below it is treated as 0, above it is refused.
 const SMALLEST_RADIUS: f64 = 1e-9;
 const LARGEST_RADIUS: f64 = 1e4;
 
@@ -64,8 +63,8 @@ pub(crate) fn punctual_lights(
     Ok(lights)
 }
 
-/// How a light at a node shines; `None` if the node's transform leaves it no direction. Lengths of axes are ignored, as
-/// they are for cameras.
+/// The kind of a light at a node; `None` if the node's transform leaves it no direction. Lengths of axes are ignored, as for
+/// cameras.
 fn kind_of(light: &JsonLight, placed: &PlacedNode<'_>) -> Check<Option<LightKind>> {
     let Checked::Valid(kind) = light.type_ else {
         return Err(damaged("its type is neither point nor spot nor directional"));
@@ -89,7 +88,7 @@ fn kind_of(light: &JsonLight, placed: &PlacedNode<'_>) -> Check<Option<LightKind
 
 /// 1 − cos of a spot's angles.
 fn cone(light: &JsonLight) -> Check<(f64, f64)> {
-    // Exporters leave out an object of which all is as by default.
+    // Exporters omit an object whose values are all defaults.
     let [in_file_inner, in_file_outer] = match &light.spot {
         Some(spot) => [spot.inner_cone_angle, spot.outer_cone_angle],
         None => [0.0, std::f32::consts::FRAC_PI_4],
@@ -136,7 +135,7 @@ fn place(
             .map(|range| f64::from(range) * normalisation.scale),
     };
     let is_directional = matches!(kind, LightKind::Directional { .. });
-    // Radiance stays as it is in render space, and irradiance. Intensity is irradiance times a length's square.
+    // Radiance and irradiance are the same in render space. Intensity is irradiance times a squared length.
     let unit = if is_directional {
         1.0
     } else {
@@ -166,7 +165,7 @@ fn place(
     })
 }
 
-/// The radius of a point or spot in render units. One that the scene's coordinates can't tell from none is none.
+/// The radius of a point or spot in render units. A radius below the precision of the scene's coordinates becomes 0.
 fn radius_of(radius: f64) -> Check<f64> {
     if radius > LARGEST_RADIUS {
         return Err(format!(

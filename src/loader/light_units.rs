@@ -1,4 +1,4 @@
-//! What the numbers of punctual lights mean, which exporters don't agree on.
+//! Units of punctual lights, which differ between exporters.
 
 use gltf_json::Root;
 
@@ -6,10 +6,10 @@ use crate::config::choices;
 use crate::scene::{LoadChoice, Remark};
 use crate::text::quote;
 
-/// Lumens a watt by which Blender's exporter multiplies lamps in its «Standard» units, and not what emits.
+/// Lumens per watt, by which Blender's exporter multiplies punctual lights in its «Standard» units, but not emissive materials.
 const LUMENS_PER_WATT: f64 = 683.0;
 
-/// What the generator of Blender's exporter begins with.
+/// Prefix of the generator of Blender's exporter.
 const BLENDER: &str = "Khronos glTF Blender I/O";
 
 /// Its first version with such units; older ones write what is «Unitless» now.
@@ -19,18 +19,18 @@ choices! {
     /// Units of the intensities of punctual lights.
     #[derive(Default)]
     pub enum LightUnits {
-        /// `blender` where the file says that Blender's exporter wrote it, which is said, else `spec`.
+        /// `blender` for files of Blender's exporter, with a note, otherwise `spec`.
         #[default]
         Auto => "auto",
-        /// Intensity and irradiance on the scale of emitted radiance, as `KHR_lights_punctual` has it.
+        /// Intensity and irradiance on the scale of emitted radiance, as in `KHR_lights_punctual`.
         Spec => "spec",
-        /// 683 times as much, as Blender's exporter has it in «Standard» units.
+        /// 683 times as much, as in Blender's «Standard» units.
         Blender => "blender",
     }
 }
 
 impl LightUnits {
-    /// What intensities of a file are to be divided by.
+    /// Divisor of a file's intensities.
     pub(crate) fn divisor(self, root: &Root) -> f64 {
         match self {
             Self::Auto if is_in_lumens(generator(root)) => LUMENS_PER_WATT,
@@ -39,7 +39,7 @@ impl LightUnits {
         }
     }
 
-    /// What is to be said of a file with punctual lights.
+    /// The note for a file with punctual lights.
     pub(crate) fn note(self, root: &Root) -> Option<Remark> {
         let taken = self == Self::Auto && is_in_lumens(generator(root));
         taken.then(|| {

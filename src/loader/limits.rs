@@ -1,7 +1,7 @@
-//! How much a file may show.
+//! Limits of a file's content.
 
-/// The most triangles that a scene may have. A few hundred bytes of instances of instances could ask for any number.
+/// Maximum number of triangles of a scene. A few hundred bytes of nested instances could request any number.
 pub(crate) const MAX_TRIANGLES: usize = 1 << 25;
 
-/// The most primitives of all nodes together.
+/// Maximum number of primitives of all nodes together.
 pub(crate) const MAX_OBJECTS: usize = 1 << 20;

@@ -1,4 +1,4 @@
-//! From a glTF file to a [`Scene`].
+//! Loads a glTF file as a [`Scene`].
 
 mod animation;
 mod camera;
@@ -37,26 +37,25 @@ use crate::error::{Error, Result};
 use crate::scene::{Environment, LoadChoice, Remark, Scene, Surface, framed_on};
 use crate::text::{quote, shorten};
 
-/// What a scene is loaded with.
+/// Options for loading a scene.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadOptions {
-    /// The time that the file's animations are applied at, in seconds. `None`: nodes and morph targets are as the file
-    /// has them at rest.
+    /// The time that the file's animations are applied at, in seconds. `None`: nodes and morph targets are at rest.
     pub frame_time: Option<f64>,
-    /// What surrounds the scene. `None`: nothing, or white light where the scene has no light at all, which is said.
+    /// Environment lighting. `None`: none, or white light if the scene has no light at all, with a note.
     pub environment: Option<Environment>,
-    /// Bytes that the scene may take as it is read, in all: buffers, what was compressed in them, geometry, images, environment.
+    /// Maximum memory of the scene while it is read, in bytes: buffers, decompressed data, geometry, images, environment.
     /// `None`: [`MEMORY_LIMIT`].
     pub memory_limit: Option<u64>,
     /// The material variant (KHR_materials_variants) with that name. `None`: primitives have their own materials.
     pub variant: Option<String>,
     /// The scene of the file, by name or index. `None`: its default one.
     pub scene: Option<String>,
-    /// What the intensities of punctual lights mean.
+    /// Units of punctual lights.
     pub light_units: LightUnits,
-    /// Whether glass without a volume is solid where its mesh is closed, instead of a thin wall.
+    /// Whether glass without a volume is solid if its mesh is closed, instead of a thin wall.
     pub solid_glass: bool,
-    /// The angle that directional lights take up, in degrees, 0 ..= 180; 0: their rays are parallel.
+    /// The angle that directional lights subtend, in degrees, 0 ..= 180; 0: their rays are parallel.
     pub sun_angle: f64,
     /// Radius of points and spots, in scene units; 0: they have no extent.
     pub light_radius: f64,
@@ -65,7 +64,7 @@ pub struct LoadOptions {
 impl Scene {
     /// Reads a glTF 2.0 file, `.gltf` or `.glb`, with the buffers that it refers to.
     ///
-    /// What the file asks for and the renderer doesn't do yet is named in [`Scene::warnings`].
+    /// Unsupported features of the file are listed in [`Scene::warnings`].
     ///
     /// # Errors
     ///
@@ -87,7 +86,7 @@ impl Scene {
     }
 }
 
-/// What failed: of all that can, memory is told apart.
+/// A failure: out of memory, or another one.
 fn failure(path: &Path, what: String, refused: &FirstRefusal) -> Error {
     match &*refused.borrow() {
         Some(refusal) if what.contains(&refusal.what) => Error::Memory {

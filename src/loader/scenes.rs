@@ -1,4 +1,4 @@
-//! Which of a file's scenes is rendered.
+//! Chooses one of a file's scenes.
 
 use gltf_json::{Root, Scene};
 
@@ -6,9 +6,9 @@ use super::diagnostic::{Check, damaged, label};
 use crate::scene::{LoadChoice, Remark};
 use crate::text::{list, quote};
 
-/// Index of the scene: the one with the name or, if none has it, the number that is wanted, or else the default one. Where that
-/// shows no mesh or there is none, the first one that shows any is taken. `None`: the file has no scenes. `notes` tell which it is
-/// where there are several. `parents` are those of all nodes, which form trees.
+/// Index of the scene: the one with the wanted name or, if none has it, number; otherwise the default scene. If that has no mesh,
+/// or there is no default, the first scene with a mesh. `None`: the file has no scenes. `notes` get a line if there are several.
+/// `parents` are those of all nodes, which form trees.
 pub(crate) fn choose(
     root: &Root,
     parents: &[Option<usize>],

@@ -1,4 +1,4 @@
-//! Textures: which places of which images a material looks its values up at.
+//! Textures: images, and how materials look up values in them.
 
 use crate::loader::extensions::{BASISU, WEBP};
 use crate::scene::Textures;
@@ -18,7 +18,7 @@ use crate::text::list;
 /// Source of a texture that names no image.
 const NO_SOURCE: usize = u32::MAX as usize;
 
-/// What a material says of one of its textures, whatever it is for.
+/// A material's reference to a texture, for any use.
 #[derive(Debug, Clone)]
 pub(crate) struct TextureUse {
     /// Index of the texture.
@@ -35,7 +35,7 @@ pub(crate) struct TextureReader<'a> {
     document: &'a Document,
     folder: &'a Path,
     textures: Textures,
-    /// First texel and size of each image that has been read; `None` of one that can't be.
+    /// First texel and size of each image that has been read; `None` if it can't be.
     images: HashMap<usize, Option<[u32; 2]>>,
 }
 
@@ -50,7 +50,7 @@ impl<'a> TextureReader<'a> {
         }
     }
 
-    /// All that have been read.
+    /// All textures that have been read.
     pub(crate) fn finish(self) -> Textures {
         self.textures
     }
@@ -119,7 +119,7 @@ impl<'a> TextureReader<'a> {
 }
 
 impl TextureReader<'_> {
-    /// First texel and size of the image of a texture: the first one that can be read of those that it names.
+    /// First texel and size of a texture's image: the first one of its alternatives that can be read.
     fn image(
         &mut self,
         index: usize,
@@ -183,7 +183,7 @@ impl TextureReader<'_> {
     }
 }
 
-/// Where an image of so many texels begins after those of the others. Kernels count texels in 32 bits.
+/// First texel of an image of this size, after the others. Kernels index texels by 32 bits.
 fn first_texel(before: u64, count: u64) -> Check<u32> {
     let most = u64::from(u32::MAX);
     let fits = before.checked_add(count).is_some_and(|all| all <= most);
@@ -194,8 +194,8 @@ fn first_texel(before: u64, count: u64) -> Check<u32> {
     })
 }
 
-/// The images that a texture names, each to stand for those before it: what extensions name is better than what is there for
-/// programs that don't know them.
+/// The images of a texture, in order of preference: those of extensions are better than the fallback for programs that do not
+/// know them.
 fn sources(texture: &gltf_json::Texture) -> Vec<usize> {
     let extensions = texture.extensions.as_ref();
     let of_extension = |name| {

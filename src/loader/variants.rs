@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::diagnostic::{Check, damaged};
 use crate::text::{list, quote};
 
-/// What the file has of the extension.
+/// The extension's object of the file.
 #[derive(Deserialize)]
 struct Variants {
     variants: Vec<Variant>,
@@ -18,7 +18,7 @@ struct Variant {
     name: String,
 }
 
-/// What a primitive has of it.
+/// The extension's object of a primitive.
 #[derive(Deserialize)]
 struct Mappings {
     mappings: Vec<Mapping>,
@@ -41,7 +41,7 @@ pub(crate) fn names(root: &Root) -> Check<Vec<String>> {
     Ok(variants.into_iter().map(|variant| variant.name).collect())
 }
 
-/// Gives primitives the materials of the variant of that name, one of `names`.
+/// Sets the primitives' materials to those of the variant with that name, one of `names`.
 pub(crate) fn choose(root: &mut Root, names: &[String], wanted: &str) -> Check<()> {
     let Some(chosen) = names.iter().position(|name| name == wanted) else {
         let there_are = match names {

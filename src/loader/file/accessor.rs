@@ -8,21 +8,21 @@ use super::document::Document;
 use super::elements::{Elements, Format, unsigned};
 use crate::loader::diagnostic::Check;
 
-/// The formats that something may be stored in.
+/// The formats allowed for a use.
 pub(crate) struct Formats {
-    /// By glTF itself (2.0, section 3.7.2.1).
+    /// Formats of core glTF (2.0, section 3.7.2.1).
     core: &'static [Format],
-    /// Besides, in a file that uses `KHR_mesh_quantization`.
+    /// Additional formats in a file that uses `KHR_mesh_quantization`.
     quantized: &'static [Format],
 }
 
-/// Floats alone.
+/// Only floats.
 const FLOAT: &[Format] = &[Format::plain(F32)];
 /// Floats and fractions of unsigned integers.
 const UNSIGNED_FRACTIONS: &[Format] = &[Format::plain(F32), Format::normalized(U8), Format::normalized(U16)];
 const SIGNED_FRACTIONS: &[Format] = &[Format::normalized(I8), Format::normalized(I16)];
 
-/// What is never anything but floats: keyframe times, translations, scales, matrices.
+/// Uses that allow only floats: keyframe times, translations, scales, matrices.
 pub(crate) const FLOATS: Formats = Formats {
     core: FLOAT,
     quantized: &[],
@@ -64,13 +64,13 @@ pub(crate) const FRACTIONS: Formats = Formats {
     quantized: &[],
 };
 
-/// What instances of a node give rotations as.
+/// Rotations of instances of a node.
 pub(crate) const INSTANCE_ROTATIONS: Formats = Formats {
     core: &[Format::plain(F32), Format::normalized(I8), Format::normalized(I16)],
     quantized: &[],
 };
 
-/// What animations give rotations and weights as.
+/// Rotations and weights of animations.
 pub(crate) const ANIMATED_FRACTIONS: Formats = Formats {
     core: &[
         Format::plain(F32),
@@ -112,7 +112,7 @@ impl<'a, const N: usize> Vectors<'a, N> {
 
     /// The vector at `index`, which is less than `len`. It may hold NaN or infinity.
     pub(crate) fn get(&self, index: usize) -> [f64; N] {
-        // An alpha that isn't there is 1; no other use has fewer components than N.
+        // A missing alpha is 1; no other use has fewer components than N.
         let mut vector = [1.0; N];
         let width = self.0.width.min(N);
         match self.0.get(index) {
@@ -141,7 +141,7 @@ impl<'a> Vectors<'a, 4> {
     }
 }
 
-/// A component as a number; fractions as glTF 2.0, section 3.6.2.2, has them.
+/// A component as a number; fractions as defined in glTF 2.0, section 3.6.2.2.
 fn number(
     bytes: &[u8],
     Format {

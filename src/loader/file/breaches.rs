@@ -1,4 +1,4 @@
-//! What a file has that glTF forbids and that changes nothing: it is read as other viewers read it, and said in one line.
+//! Harmless violations of glTF: the file is read as by other viewers, with a warning of one line.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::loader::diagnostic::Warnings;
 use crate::text::{list, quote};
 
-/// The names of primitives' attributes in glTF; some are followed by the number of their set.
+/// Names of primitives' attributes in glTF; some are followed by the number of their set.
 const ATTRIBUTES: [&str; 7] = [
     "POSITION",
     "NORMAL",
@@ -17,7 +17,7 @@ const ATTRIBUTES: [&str; 7] = [
     "JOINTS_",
     "WEIGHTS_",
 ];
-/// The values of a sampler's members: how it filters and wraps.
+/// Valid values of a sampler's filters and wrap modes.
 const FILTERS: [u64; 6] = [9728, 9729, 9984, 9985, 9986, 9987];
 const WRAPS: [u64; 3] = [33071, 33648, 10497];
 
@@ -30,7 +30,7 @@ struct Breaches {
     samplers: Vec<String>,
 }
 
-/// Warns of them, in JSON as the file has it.
+/// Warns of violations in the original JSON.
 pub(crate) fn warn(root: &Value, warnings: &mut Warnings) {
     let mut found = Breaches::default();
     found.look("", root);
@@ -53,7 +53,7 @@ pub(crate) fn warn(root: &Value, warnings: &mut Warnings) {
 }
 
 impl Breaches {
-    /// Looks at a value and all below, but not at `extras`, which may be anything, and extensions, which have schemas of their own.
+    /// Checks a value and all below, except `extras`, which may be anything, and extensions, which have their own schemas.
     fn look(&mut self, name: &str, value: &Value) {
         match value {
             Value::Null => _ = self.nulls.insert(name.to_owned()),
@@ -86,7 +86,7 @@ impl Breaches {
     }
 }
 
-/// Whether a name is one of glTF's own or of an application.
+/// Whether a name is one of glTF or of an application.
 fn is_attribute(name: &str) -> bool {
     let is_own = |own: &&str| match name.strip_prefix(*own) {
         Some(rest) => rest.is_empty() != own.ends_with('_'),
@@ -95,7 +95,7 @@ fn is_attribute(name: &str) -> bool {
     name.starts_with('_') || ATTRIBUTES.iter().any(is_own)
 }
 
-/// Whether a sampler of textures has values that glTF doesn't know. Those of animations have no such members.
+/// Whether a sampler of textures has invalid values. Samplers of animations have no such members.
 fn has_other_modes(sampler: &Value) -> bool {
     let is_other = |name: &str, known: &[u64]| {
         let value = sampler.get(name).and_then(Value::as_f64);

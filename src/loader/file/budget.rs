@@ -1,4 +1,4 @@
-//! What a scene may take of memory.
+//! The memory budget of a scene.
 
 use std::cell::{Cell, RefCell};
 use std::fmt::Display;
@@ -7,12 +7,12 @@ use std::rc::Rc;
 use crate::loader::diagnostic::Check;
 use crate::text::bytes;
 
-/// Bytes that a scene may take where the user doesn't say: as many as one buffer of usual devices. It doesn't follow the machine's
-/// memory, so that a scene that is read on one is read on all.
+/// Default limit of a scene's memory, in bytes: the size of one buffer of common devices. It does not depend on the machine's
+/// memory, so that a scene that loads on one machine loads on all.
 pub const MEMORY_LIMIT: u64 = 2 << 30;
 
-/// What a scene may take and has taken, with what reading needs for a while. A small file can ask for any amount: sizes are
-/// asked for before they are taken.
+/// The budget of a scene and its use, including temporary memory while reading. A small file can request any amount, so sizes are
+/// checked before memory is allocated.
 #[derive(Debug)]
 pub(crate) struct Budget {
     limit: u64,
@@ -20,12 +20,12 @@ pub(crate) struct Budget {
     refused: FirstRefusal,
 }
 
-/// More than the limit was asked for.
+/// A request exceeded the limit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Refusal {
-    /// By what.
+    /// The item that requested it.
     pub what: String,
-    /// The limit that would have been enough, bytes.
+    /// A limit that would have been sufficient, in bytes.
     pub needed: u64,
 }
 
@@ -33,7 +33,7 @@ pub(crate) struct Refusal {
 pub(crate) type FirstRefusal = Rc<RefCell<Option<Refusal>>>;
 
 impl Budget {
-    /// Nothing is taken yet.
+    /// An unused budget.
     pub(crate) fn new(limit: u64) -> Self {
         Self {
             limit,
@@ -42,19 +42,19 @@ impl Budget {
         }
     }
 
-    /// Where the first refusal will be.
+    /// The place of the first refusal.
     pub(crate) fn refused(&self) -> FirstRefusal {
         Rc::clone(&self.refused)
     }
 
-    /// Takes `size` bytes for `what`, to be kept.
+    /// Takes `size` bytes for `what` permanently.
     pub(crate) fn take(&self, size: u64, what: impl Display) -> Check<()> {
         self.check(size, what)?;
         self.taken.set(self.taken.get() + size);
         Ok(())
     }
 
-    /// Whether `size` bytes are left for `what`, for a while.
+    /// Whether `size` bytes are available for `what` temporarily.
     pub(crate) fn check(&self, size: u64, what: impl Display) -> Check<()> {
         let taken = self.taken.get();
         let needed = taken.saturating_add(size);
@@ -75,7 +75,7 @@ impl Budget {
         Err(text)
     }
 
-    /// Fails if anything was refused, though the scene could do without it.
+    /// Fails if any request was refused, even if the scene could do without it.
     pub(crate) fn settle(&self) -> Check<()> {
         self.refused
             .borrow()

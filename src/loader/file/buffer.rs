@@ -1,4 +1,4 @@
-//! Reads the buffers that a glTF file refers to: the `.glb` binary chunk, data URIs and files beside it.
+//! Reads the buffers that a glTF file refers to: the `.glb` binary chunk, data URIs and external files.
 
 use std::fs::{self, File};
 use std::io::Read;
@@ -14,7 +14,7 @@ use super::meshopt;
 use crate::loader::diagnostic::{Check, Warnings, damaged, label};
 use crate::text::quote;
 
-/// Base64 that may lack its padding, which some exporters leave out.
+/// Base64 with optional padding, which some exporters omit.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &base64::alphabet::STANDARD,
     GeneralPurposeConfig::new()
@@ -22,7 +22,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// Bytes that a buffer may lack at its end: some exporters count padding that they don't write.
+/// Number of bytes that may be missing at a buffer's end: some exporters count padding that they do not write.
 const MOST_PADDING: u64 = 3;
 
 /// Reads each buffer of `root`. `folder` holds the scene file, `binary` is the binary chunk of a `.glb`.
@@ -33,7 +33,7 @@ pub(crate) fn read_all(
     budget: &Budget,
     warnings: &mut Warnings,
 ) -> Check<Vec<Vec<u8>>> {
-    // Before any is read: a small file can name a large one a thousand times.
+    // Checked before any is read: a small file can refer to a large one a thousand times.
     let total = root
         .buffers
         .iter()
@@ -85,13 +85,13 @@ fn read(buffer: &Buffer, folder: &Path, binary: Option<Vec<u8>>, warn: impl FnOn
             bytes.len()
         )));
     }
-    // What follows is padding.
+    // The rest is padding.
     bytes.resize(length as usize, 0);
     Ok(bytes)
 }
 
-/// The bytes that the uri of an image stands for. Of a file as many as `needed` says after a look at its first ones: what follows
-/// may have no end.
+/// The data of an image's URI. Of a file, `needed` returns the number of bytes to read from its first ones: the file may be
+/// endless.
 pub(crate) fn read_uri(uri: &str, folder: &Path, needed: impl FnOnce(&[u8]) -> u64, budget: &Budget) -> Check<Vec<u8>> {
     if let Some(data) = data_of(uri) {
         return decode_data_uri(data);
@@ -107,10 +107,10 @@ pub(crate) fn read_uri(uri: &str, folder: &Path, needed: impl FnOnce(&[u8]) -> u
     read_file(&path, length)
 }
 
-/// Bytes that a file of an image is looked at first.
+/// Number of bytes of an image file that are examined first.
 const HEAD: u64 = 1 << 20;
 
-/// The files that buffers and images refer to, whether they are read or not.
+/// The files that buffers and images refer to, read or not.
 pub(crate) fn referred_files<'a>(root: &'a Root, folder: &'a Path) -> impl Iterator<Item = PathBuf> + 'a {
     let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
     let images = root.images.iter().filter_map(|image| image.uri.as_deref());
@@ -118,17 +118,17 @@ pub(crate) fn referred_files<'a>(root: &'a Root, folder: &'a Path) -> impl Itera
     files.filter_map(|uri| path_of(uri, folder).ok())
 }
 
-/// `length` bytes from byte `start`, if there are as many.
+/// `length` bytes from byte `start`, if they exist.
 pub(crate) fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
     let end = usize::try_from(start.checked_add(length)?).ok()?;
     bytes.get(usize::try_from(start).ok()?..end)
 }
 
-/// Reads the first `length` bytes of a file, or all where it is shorter.
+/// Reads the first `length` bytes of a file, or all if it is shorter.
 fn read_file(path: &Path, length: u64) -> Check<Vec<u8>> {
     let place = quote(&path.to_string_lossy());
     let unreadable = |error| format!("{place} can't be read ({error}); put the file there");
-    // Opening a pipe would wait for a writer, and a device may have no end: ask before.
+    // Checked first: opening a pipe would wait for a writer, and a device may be endless.
     let metadata = fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
         return Err(format!("{place} isn't a file; put the file there"));
@@ -140,14 +140,14 @@ fn read_file(path: &Path, length: u64) -> Check<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What follows `data:`, in capitals or not.
+/// The part after `data:`, in any case.
 fn data_of(uri: &str) -> Option<&str> {
     let (scheme, data) = uri.split_at_checked("data:".len())?;
     scheme.eq_ignore_ascii_case("data:").then_some(data)
 }
 
-/// Decodes `[media type][;base64],…`, what follows `data:`: RFC 2397. Media types are not told apart. Line ends in base64 are
-/// skipped, as browsers do.
+/// Decodes `[media type][;base64],…`, the part after `data:`: RFC 2397. Media types are ignored. Line ends in base64 are skipped,
+/// as browsers do.
 fn decode_data_uri(data: &str) -> Check<Vec<u8>> {
     let (head, body) = data
         .split_once(',')
@@ -165,7 +165,7 @@ fn decode_data_uri(data: &str) -> Check<Vec<u8>> {
         .map_err(|error| damaged(format_args!("its data URI isn't valid base64 ({error})")))
 }
 
-/// The file that a relative URI names. A query or fragment is a part of its name only where there is such a file.
+/// The file that a relative URI names. A query or fragment belongs to its name only if such a file exists.
 fn path_of(uri: &str, folder: &Path) -> Check<PathBuf> {
     let path = folder.join(relative_path(uri)?);
     match uri.find(['?', '#']) {
@@ -204,7 +204,7 @@ fn relative_path(uri: &str) -> Check<PathBuf> {
     Ok(path)
 }
 
-/// Replaces `%2F` and the like; a `%` without two digits stands for itself.
+/// Decodes `%2F` and similar; a `%` without two digits is kept.
 fn percent_decode(uri: &str) -> Vec<u8> {
     let mut decoded = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();

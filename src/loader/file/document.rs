@@ -1,7 +1,7 @@
-//! Reads a `.gltf` or `.glb` file and its buffers, without looking at what they describe.
+//! Reads a `.gltf` or `.glb` file and its buffers, without interpreting them.
 //!
-//! The `gltf` crate's own reader is not used beyond its JSON types: its validation indexes accessors unchecked, takes
-//! `KHR_materials_volume` for unsupported, and rejects the custom attributes that the format allows.
+//! The `gltf` crate's own reader is not used beyond its JSON types: its validation indexes accessors unchecked, treats
+//! `KHR_materials_volume` as unsupported, and rejects custom attributes that the format allows.
 
 use crate::loader::extensions::{QUANTIZATION, SUPPORTED};
 use std::collections::HashMap;
@@ -18,14 +18,14 @@ use super::{buffer, draco, glb, json, meshopt};
 use crate::loader::diagnostic::{Check, Warnings, damaged};
 use crate::text::quote;
 
-/// The largest file that is read, in bytes: what a `.glb` header can express.
+/// Maximum size of a file, in bytes: the maximum of a `.glb` header.
 const MAX_FILE_SIZE: u64 = u32::MAX as u64;
 
 /// The file's JSON and the bytes of its buffers. Indices in the JSON are unchecked.
 pub(crate) struct Document {
     /// The JSON.
     pub root: Root,
-    /// One byte string per `root.buffers`, as long as its `byteLength`, or empty where compressed views stand for it.
+    /// One byte string per `root.buffers`, as long as its `byteLength`, or empty if compressed views replace it.
     buffers: Vec<Vec<u8>>,
     /// The bytes of the views that are stored compressed.
     decoded_views: HashMap<usize, Vec<u8>>,
@@ -33,12 +33,12 @@ pub(crate) struct Document {
     pub decompressed: HashMap<usize, Vec<u8>>,
     /// Whether the file uses [`QUANTIZATION`].
     pub is_quantized: bool,
-    /// What memory there is for the rest of the scene.
+    /// The memory budget for the rest of the scene.
     pub budget: Budget,
 }
 
 impl Document {
-    /// Reads the file at `path` and all buffers that it refers to, for a scene that may take what is left of the budget.
+    /// Reads the file at `path` and all buffers that it refers to, within the rest of the budget.
     pub(crate) fn read(path: &Path, budget: Budget, warnings: &mut Warnings) -> Check<Self> {
         let mut bytes = read_file(path, &budget)?;
         let (json, binary) = if bytes.starts_with(glb::MAGIC) {
@@ -48,7 +48,7 @@ impl Document {
         };
         json::check_size(&bytes[json.clone()], &budget)?;
         let root = parse(&bytes[json], warnings)?;
-        // The binary chunk can be most of the file: shrink to it instead of copying.
+        // The binary chunk can be most of the file: it is kept in place instead of copied.
         let binary = binary.map(|chunk| {
             bytes.truncate(chunk.end);
             bytes.drain(..chunk.start);
@@ -114,7 +114,7 @@ fn read_file(path: &Path, budget: &Budget) -> Check<Vec<u8>> {
 
 fn parse(json: &[u8], warnings: &mut Warnings) -> Check<Root> {
     let json = json::read(json, warnings)?;
-    // Before the rest: another version or extension may have another structure.
+    // Checked first: another version or extension may have another structure.
     check_version(&json)?;
     let required = json.get("extensionsRequired").and_then(Value::as_array);
     for extension in required.into_iter().flatten().filter_map(Value::as_str) {

@@ -17,19 +17,19 @@ use super::document::Document;
 use crate::loader::diagnostic::{Check, Warnings, damaged, primitive_label};
 use crate::loader::limits::MAX_TRIANGLES;
 
-/// The most that all decompressed primitives may hold, in bytes: a thousand bytes can stand for millions of equal vertices.
+/// Maximum size of all decompressed primitives, in bytes: a thousand bytes can expand to millions of equal vertices.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// How a primitive is compressed: the extension's object.
+/// The extension's object of a primitive.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Compressed {
     buffer_view: usize,
-    /// Numbers within the compressed data, by the attribute's name.
+    /// Ids within the compressed data, by the attribute's name.
     attributes: BTreeMap<String, u32>,
 }
 
-/// The data of an accessor that isn't in any buffer.
+/// Data of an accessor that is not in a buffer.
 struct Decompressed {
     count: usize,
     component: ComponentType,
@@ -37,8 +37,8 @@ struct Decompressed {
     bytes: Vec<u8>,
 }
 
-/// Gives each compressed primitive accessors of its own, whose bytes [`Document::decompressed`] has. Where that fails, a primitive
-/// that has its data uncompressed as well keeps it, with a warning.
+/// Gives each compressed primitive new accessors, whose bytes are in [`Document::decompressed`]. If that fails, a primitive that
+/// also has uncompressed data keeps it, with a warning.
 pub(crate) fn decompress(document: &mut Document, warnings: &mut Warnings) -> Check<()> {
     let mut decoder = Decoder::default();
     for mesh in 0..document.root.meshes.len() {
@@ -69,12 +69,12 @@ pub(crate) fn decompress(document: &mut Document, warnings: &mut Warnings) -> Ch
     document.budget.take(decoder.bytes, "decompressed data")
 }
 
-/// What the accessors of a primitive become; the indices have no name.
+/// The new accessors of a primitive; the indices have no name.
 type Parts = Vec<(Option<Checked<gltf_json::mesh::Semantic>>, Accessor, Vec<u8>)>;
 
 #[derive(Default)]
 struct Decoder {
-    /// By view: primitives may share what is compressed.
+    /// By view: primitives may share compressed data.
     meshes: HashMap<usize, Mesh>,
     bytes: u64,
     triangles: u64,
@@ -159,7 +159,7 @@ fn too_much() -> String {
     format!("it and those before have more than the {MOST_BYTES} bytes that are read; split the scene")
 }
 
-/// Whether all that a primitive names is in buffers.
+/// Whether all data of a primitive is in buffers.
 fn has_plain_data(document: &Document, primitive: &Primitive) -> bool {
     let mut accessors = primitive.attributes.values().chain(&primitive.indices);
     accessors.all(|index| {
@@ -168,7 +168,7 @@ fn has_plain_data(document: &Document, primitive: &Primitive) -> bool {
     })
 }
 
-/// The values of an attribute at all points, as far as there are `left` bytes for them.
+/// The values of an attribute at all points, if `left` bytes are sufficient.
 fn decompressed(attribute: &PointAttribute, points: usize, left: u64) -> Check<Decompressed> {
     let component = match attribute.data_type() {
         DataType::Int8 => ComponentType::I8,
@@ -209,7 +209,7 @@ fn decompressed(attribute: &PointAttribute, points: usize, left: u64) -> Check<D
     })
 }
 
-/// An accessor, with what it says of its data as that is.
+/// An accessor that describes decompressed data.
 fn filled(mut accessor: Accessor, data: Decompressed) -> (Accessor, Vec<u8>) {
     accessor.buffer_view = None;
     accessor.byte_offset = None;
@@ -221,7 +221,7 @@ fn filled(mut accessor: Accessor, data: Decompressed) -> (Accessor, Vec<u8>) {
     (accessor, data.bytes)
 }
 
-/// An accessor of indices before it has any.
+/// An accessor of indices, initially empty.
 fn blank() -> Accessor {
     Accessor {
         buffer_view: None,
@@ -239,14 +239,14 @@ fn blank() -> Accessor {
     }
 }
 
-/// Puts the accessors into the document in place of what the primitive had.
+/// Replaces the primitive's accessors in the document.
 fn replace(document: &mut Document, [mesh, primitive]: [usize; 2], parts: Parts) {
     for (semantic, accessor, bytes) in parts {
         let index = document.root.accessors.len();
         document.root.accessors.push(accessor);
         document.decompressed.insert(index, bytes);
         let primitive = &mut document.root.meshes[mesh].primitives[primitive];
-        // Strips are triangles once they are decompressed.
+        // Decompressed strips are triangles.
         primitive.mode = Checked::Valid(Mode::Triangles);
         match semantic {
             Some(semantic) => drop(primitive.attributes.insert(semantic, Index::new(index as u32))),

@@ -1,4 +1,4 @@
-//! Where the elements of an accessor lie: everything is verified when one is opened, so that reading can't fail.
+//! Access to the elements of an accessor: everything is verified when it is opened, so that reading can't fail.
 
 use std::fmt::Debug;
 
@@ -11,7 +11,7 @@ use super::buffer::slice;
 use super::document::Document;
 use crate::loader::diagnostic::{Check, damaged, label};
 
-/// The most elements of an accessor that has no data of its own: no byte of the file stands behind their number.
+/// Maximum number of elements of an accessor without data: the file's size does not limit their number.
 const MAX_ZEROS: u64 = 1 << 20;
 
 /// How components are stored.
@@ -19,12 +19,12 @@ const MAX_ZEROS: u64 = 1 << 20;
 pub(crate) struct Format {
     /// The type of each.
     pub component: ComponentType,
-    /// Whether integers stand for fractions of the type's largest value.
+    /// Whether integers are fractions of the type's largest value.
     pub is_normalized: bool,
 }
 
 impl Format {
-    /// Numbers as they are.
+    /// Plain numbers.
     pub(crate) const fn plain(component: ComponentType) -> Self {
         Self {
             component,
@@ -32,7 +32,7 @@ impl Format {
         }
     }
 
-    /// Integers that stand for fractions.
+    /// Integers that are fractions.
     pub(crate) const fn normalized(component: ComponentType) -> Self {
         Self {
             component,
@@ -46,7 +46,7 @@ impl Format {
     }
 }
 
-/// The elements of an accessor, with what its sparse part replaces.
+/// The elements of an accessor, including its sparse part.
 #[derive(Clone, Copy)]
 pub(crate) struct Elements<'a> {
     /// `None`: all are zero.
@@ -56,7 +56,7 @@ pub(crate) struct Elements<'a> {
     pub count: usize,
     /// Number of components of each.
     pub width: usize,
-    /// How they are stored.
+    /// Their format.
     pub format: Format,
 }
 
@@ -105,7 +105,7 @@ impl<'a> Elements<'a> {
             .map(|sparse| Sparse::locate(document, sparse, count, size))
             .transpose()
             .map_err(|what| format!("its sparse part: {what}"))?;
-        // The elements were found to lie in memory, or to be few, so their number fits as well.
+        // The elements are in memory, or few, so their number fits as well.
         let count = usize::try_from(count).map_err(|_| format!("{count} elements are too many"))?;
         Ok(Self {
             base,
@@ -124,12 +124,12 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// The type and format of an accessor, if they are among those that are wanted.
+/// The type and format of an accessor, if they are allowed.
 fn kind(accessor: &Accessor, shapes: &[Type], formats: &[Format]) -> Check<(Type, Format)> {
     let format = match accessor.component_type {
         Checked::Valid(component) => Some(Format {
             component: component.0,
-            // Floats are what they are, whatever the flag says.
+            // The flag does not apply to floats.
             is_normalized: accessor.normalized && component.0 != ComponentType::F32,
         }),
         Checked::Invalid => None,
@@ -161,7 +161,7 @@ fn alternatives(items: impl Iterator<Item = String>) -> String {
     items.collect::<Vec<_>>().join(" or ")
 }
 
-/// What a sparse accessor replaces: elements at increasing indices.
+/// The sparse part of an accessor: replaced elements at increasing indices.
 #[derive(Clone, Copy)]
 struct Sparse<'a> {
     count: usize,
@@ -200,7 +200,7 @@ impl<'a> Sparse<'a> {
         unsigned(self.indices.get(at)) as usize
     }
 
-    /// What stands for the element at `index`, if it is replaced.
+    /// The replacement of the element at `index`, if any.
     fn get(&self, index: usize) -> Option<&'a [u8]> {
         let (mut low, mut high) = (0, self.count);
         while low < high {
@@ -238,7 +238,7 @@ impl<'a> Packed<'a> {
             .ok_or_else(|| format!("there is no bufferView {view_index}, the file has {}", views.len()))?;
         let view_bytes = document.view_bytes(view_index, view)?;
 
-        // A stride of zero is how some files spell «tightly packed».
+        // Some files use a stride of zero for tightly packed data.
         let stride = match view.byte_stride {
             Some(stride) if stride.0 != 0 => stride.0,
             _ => size,

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::loader::diagnostic::{Check, damaged};
 
-/// What a `.glb` file begins with.
+/// The first bytes of a `.glb` file.
 pub(crate) const MAGIC: &[u8] = b"glTF";
 
 const HEADER_SIZE: usize = 12;
@@ -12,9 +12,9 @@ const CHUNK_HEADER_SIZE: usize = 8;
 const JSON: u32 = u32::from_le_bytes(*b"JSON");
 const BINARY: u32 = u32::from_le_bytes(*b"BIN\0");
 
-/// Where the JSON and, if there is one, the binary chunk lie in `bytes`, which begin with [`MAGIC`].
+/// The ranges of the JSON and, if present, the binary chunk in `bytes`, which begin with [`MAGIC`].
 ///
-/// Chunks of other types and what follows the length that the header states are skipped, as the format asks for.
+/// Chunks of other types and data beyond the length in the header are skipped, as the format requires.
 pub(crate) fn split(bytes: &[u8]) -> Check<(Range<usize>, Option<Range<usize>>)> {
     let truncated = |needed: usize| {
         format!(
@@ -37,7 +37,7 @@ pub(crate) fn split(bytes: &[u8]) -> Check<(Range<usize>, Option<Range<usize>>)>
     if json_type != JSON {
         return Err(damaged("damaged .glb: its first chunk isn't JSON"));
     }
-    // Chunks are padded to four bytes, and so are their lengths: nothing lies between them.
+    // Chunks are padded to four bytes, and their lengths include the padding: there are no gaps.
     if json.end == body.len() {
         return Ok((json, None));
     }

@@ -14,21 +14,21 @@ use crate::loader::diagnostic::{Check, damaged};
 
 /// Longest side of an image, in texels: sides are stored as 16 bits.
 const LONGEST_SIDE: u32 = 32_768;
-/// What a file may hold beside its pixels: profiles, comments, previews.
+/// Maximum size of a file's other data: profiles, comments, previews.
 const BESIDE_PIXELS: u64 = 64 << 20;
-/// What decoding may take beside the result, in bytes for each texel: 16-bit channels, and rows of filters.
+/// Temporary memory limit of decoding, in bytes per texel: 16-bit channels, and rows of filters.
 const MEMORY_A_TEXEL: u64 = 16;
-/// What decoding takes in fact: the pixels as the file has them, and a copy.
+/// Temporary memory of decoding: the pixels in the file's format, and a copy.
 const DECODING_A_TEXEL: u64 = 8;
 
-/// Bytes at the most of a file that begins like this and holds one picture.
+/// Maximum size of a file with this header and one picture, in bytes.
 fn most_bytes(head: &[u8]) -> u64 {
     let size = Raster::open(head).and_then(|raster| raster.size().ok());
     let pixels = size.map_or(u64::MAX, |[width, height]| u64::from(width) * u64::from(height));
     pixels.saturating_mul(MEMORY_A_TEXEL).saturating_add(BESIDE_PIXELS)
 }
 
-/// Pixels of an image, RGBA, as the file has them, in rows from the top left. What has more than 8 bits is rounded to them.
+/// Pixels of an image, RGBA, as the file has them, in rows from the top left. Deeper channels are rounded to 8 bits.
 pub(crate) struct Pixels {
     pub width: u32,
     pub height: u32,
@@ -82,8 +82,8 @@ impl Pixels {
     }
 }
 
-/// Number of texels of an image, whose memory is taken. A few bytes can claim to be any number of texels: this asks before there
-/// is memory for them.
+/// Number of texels of an image; takes their memory from the budget. A few bytes can claim any number of texels, so this is
+/// checked before allocation.
 fn take([width, height]: [u32; 2], budget: &Budget) -> Check<u64> {
     let texels = u64::from(width) * u64::from(height);
     if texels == 0 {

@@ -14,21 +14,20 @@ use crate::text::quote;
 const U8: u64 = 5121;
 const U16: u64 = 5123;
 
-/// Integers from here on aren't exact as floating-point numbers.
+/// Integers from here on are not exact as floating-point numbers.
 const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// Checks that there is memory for JSON, before it is read: values take much more than their text.
 pub(crate) fn check_size(json: &[u8], budget: &Budget) -> Check<()> {
-    /// Of a value as such and of a member of a struct of the `gltf` crate, about.
+    /// Approximate size of a value and of a struct member of the `gltf` crate.
     const BYTES_A_VALUE: u64 = 128;
     let values = json.iter().filter(|byte| b",[{".contains(byte)).count() as u64;
-    // Texts are copied twice.
+    // Strings are copied twice.
     budget.check(BYTES_A_VALUE * values + 2 * json.len() as u64, "its JSON")
 }
 
-/// Reads JSON, and writes alike what the schema allows to be written in several ways: members that are null are as good as
-/// absent, `extras` may be anything and are read by nobody, and integers may have a fraction of zero. Warns of what the format
-/// forbids and other viewers read.
+/// Reads JSON, and normalises what may be written in several ways: null members are removed, `extras` may be anything and are
+/// ignored, integers may have a fraction of zero. Warns of violations that other viewers accept.
 pub(crate) fn read(json: &[u8], warnings: &mut Warnings) -> Check<Value> {
     // The specification forbids a byte order mark; some editors add one all the same.
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
@@ -65,12 +64,12 @@ fn normalise(value: &mut Value) {
     }
 }
 
-/// Of an array that is a member of a value; none where it isn't.
+/// The elements of an array member of a value; empty if it is no array.
 fn elements<'a>(value: &'a Value, name: &str) -> impl Iterator<Item = &'a Value> + use<'a> {
     value.get(name).and_then(Value::as_array).into_iter().flatten()
 }
 
-/// Colours that are integers are fractions, whether or not they say so.
+/// Integer colours are fractions, even without the flag.
 fn normalise_colors(root: &mut Value, warnings: &mut Warnings) {
     let mut colors = BTreeSet::new();
     for primitive in elements(root, "meshes").flat_map(|mesh| elements(mesh, "primitives")) {
@@ -98,7 +97,7 @@ fn normalise_colors(root: &mut Value, warnings: &mut Warnings) {
     }
 }
 
-/// The glTF that it is.
+/// The glTF structure.
 pub(crate) fn to_root(mut value: Value) -> Check<Root> {
     // A scene may be without nodes.
     let scenes = value.get_mut("scenes").and_then(Value::as_array_mut);

@@ -6,33 +6,33 @@ use crate::loader::diagnostic::{Check, damaged};
 
 const MAGIC: [u8; 12] = *b"\xabKTX 20\xbb\r\n\x1a\n";
 
-/// Bytes of the header, of which the index of levels follows, and of each entry of that.
+/// Sizes of the header and of each entry of the index of levels, which follows it, in bytes.
 const HEADER_SIZE: usize = 80;
 const LEVEL_SIZE: usize = 24;
-/// The most levels: the first has a side of 2¹⁵ texels at the most.
+/// Maximum number of levels: a side has at most 2¹⁵ texels.
 const MOST_LEVELS: u32 = 16;
 
-/// Where the header says how long the keys and values are.
+/// Offset of the length of keys and values in the header.
 const KEY_VALUE_LENGTH: usize = 60;
 
-/// Bytes that the description of the format has up to its first channel.
+/// Size of the format descriptor before its first channel, in bytes.
 const DESCRIPTION_SIZE: u64 = 32;
-/// Colour models of such descriptions: what the extension allows.
+/// Colour models of descriptors that the extension allows.
 const ETC1S: u32 = 163;
 const UASTC: u32 = 166;
 
-/// Ways in which levels may be compressed once more.
+/// Supercompression schemes of levels.
 const BASIS_LZ: u32 = 1;
 const ZSTANDARD: u32 = 2;
 /// Bytes of a block of 4×4 texels.
 const UASTC_BLOCK: u64 = 16;
 
-/// Whether it is such a file.
+/// Whether it is a KTX 2.0 file.
 pub(crate) fn is_ktx2(bytes: &[u8]) -> bool {
     bytes.starts_with(&MAGIC)
 }
 
-/// What a file says of itself, all of it checked to lie within the file.
+/// The header of a file, checked against the file's size.
 pub(crate) struct Ktx2 {
     bytes: Vec<u8>,
     /// Texels of the largest level.
@@ -40,7 +40,7 @@ pub(crate) struct Ktx2 {
 }
 
 impl Ktx2 {
-    /// Reads the header. The transcoder takes what it says for granted.
+    /// Reads the header. The transcoder does not check it.
     pub(crate) fn open(bytes: &[u8]) -> Check<Self> {
         let u32_at = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
         let u64_at = |at: usize| Some(u64::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
@@ -81,7 +81,7 @@ impl Ktx2 {
             damaged("it is no KTX 2.0 picture that KHR_texture_basisu allows: of one face and layer, in ETC1S or UASTC")
         })?;
         let mut bytes = bytes.to_vec();
-        // Nothing in them matters here, and the transcoder walks past the end of damaged ones.
+        // They are not needed, and the transcoder reads beyond the end of damaged ones.
         bytes[KEY_VALUE_LENGTH..][..4].fill(0);
         Ok(Self { bytes, size })
     }

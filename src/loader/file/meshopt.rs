@@ -14,10 +14,10 @@ use super::budget::Budget;
 use super::buffer::slice;
 use crate::loader::diagnostic::{Check, damaged, label};
 
-/// Bytes that one compressed byte can stand for at the most: two bits tell a group of 16 equal bytes.
+/// Maximum expansion of a compressed byte: two bits encode a group of 16 equal bytes.
 const MAX_RATIO: u64 = 64;
 
-/// How a view is compressed: the extension's object.
+/// The extension's object of a view.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Compressed {
@@ -50,7 +50,7 @@ enum Filter {
     Exponential,
 }
 
-/// Whether a buffer holds nothing but what compressed views give as well, so that it may have no data.
+/// Whether all data of a buffer also comes from compressed views, so that it may be absent.
 pub(crate) fn is_fallback(buffer: &Buffer) -> bool {
     let extensions = buffer.extensions.as_ref();
     let extension = extensions.and_then(|extensions| extensions.others.get(MESHOPT));
@@ -81,7 +81,7 @@ pub(crate) fn decode_views(root: &Root, buffers: &[Vec<u8>], budget: &Budget) ->
 }
 
 impl Compressed {
-    /// Checks the sizes against each other and returns the decoded one. The decoder takes them for granted.
+    /// Checks the sizes against each other and returns the decoded one. The decoder does not check them.
     fn check(&self, view: &View) -> Check<u64> {
         let (count, stride) = (self.count, self.byte_stride);
         let filtered = match self.filter {

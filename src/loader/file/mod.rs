@@ -1,4 +1,4 @@
-//! What a file is made of: its JSON, buffers, accessors and images, checked as they are read, within a limit of memory.
+//! The parts of a file: JSON, buffers, accessors and images, checked as they are read, within a memory limit.
 
 pub(crate) mod accessor;
 pub(crate) mod breaches;

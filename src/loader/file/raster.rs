@@ -24,7 +24,7 @@ enum Format {
 }
 
 impl<'a> Raster<'a> {
-    /// What begins as one of the formats does.
+    /// The format of a file, by its first bytes.
     pub(crate) fn open(bytes: &'a [u8]) -> Option<Self> {
         let format = match bytes {
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Format::Png,
@@ -38,7 +38,7 @@ impl<'a> Raster<'a> {
     /// Width and height, by the first bytes.
     ///
     /// # Errors
-    /// A text, if these are damaged.
+    /// A text, if the header is damaged.
     pub(crate) fn size(&self) -> Result<[u32; 2], String> {
         match self.format {
             Format::Png => {
@@ -60,8 +60,8 @@ impl<'a> Raster<'a> {
         }
     }
 
-    /// The pixels in rows from the top left. What has more than 8 bits is rounded to them. Decoding takes about so many bytes of
-    /// memory at the most.
+    /// The pixels in rows from the top left. Deeper channels are rounded to 8 bits. The second argument limits the memory of
+    /// decoding, in bytes.
     ///
     /// # Errors
     /// A text, if the file is damaged.
@@ -133,7 +133,7 @@ fn text(error: impl Display) -> String {
     error.to_string()
 }
 
-/// 16 bits, the higher ones first, as 8.
+/// Big-endian 16-bit samples as 8 bits.
 fn rounded(sample: [u8; 2]) -> u8 {
     ((u32::from(u16::from_be_bytes(sample)) + 128) / 257) as u8
 }
@@ -163,7 +163,7 @@ mod tests {
         DynamicImage::ImageRgba16(image::ImageBuffer::from_fn(7, 5, of))
     }
 
-    /// `image` decodes each kind of samples by a way of its own.
+    /// `image` decodes each kind of samples differently.
     #[test]
     fn every_kind_of_samples_is_decoded_as_another_decoder_does() {
         let wide = pattern();

@@ -1,6 +1,6 @@
 //! Puts the primitives of all nodes into render space as one list of triangles.
 //!
-//! Positions stay f64 from the file to the end: world space may lie far from the origin, where f32 is coarse.
+//! Positions are f64 until render space: world space may be far from the origin, where f32 is coarse.
 
 use super::normalisation::normalise;
 use crate::loader::extensions::MESH_INSTANCING;
@@ -21,10 +21,10 @@ use crate::loader::file::document::Document;
 use crate::loader::graph::{PlacedNode, node_label};
 use crate::text::{list, quote};
 
-/// The most morph targets and sets of joints of all triangles together.
+/// Maximum number of morph targets and sets of joints of all triangles together.
 const MAX_DEFORMATIONS: usize = 1 << 28;
 
-/// Opens the primitives that the nodes show. Nothing of their size is allocated before the total is known.
+/// Opens the primitives of the nodes. The total is checked before anything of their size is allocated.
 pub(crate) fn instances<'a>(
     document: &'a Document,
     nodes: &'a [PlacedNode<'a>],
@@ -123,7 +123,7 @@ pub(crate) fn instances<'a>(
     Ok(instances)
 }
 
-/// Builds the triangles of all instances in render space, without those that have no area.
+/// Builds the triangles of all instances in render space, except those without area.
 pub(crate) fn assemble(
     document: &Document,
     instances: &[MeshInstance<'_>],
@@ -145,7 +145,7 @@ pub(crate) fn assemble(
         }
         let name = instance.name(root);
         match dropped.last_mut() {
-            // Instances of one node follow each other.
+            // Instances of one node are consecutive.
             Some((last, sum)) if *last == name => *sum += count,
             _ => dropped.push((name, count)),
         }
@@ -153,7 +153,7 @@ pub(crate) fn assemble(
     builder.complete_attributes();
     let geometry = builder.geometry;
     document.budget.take(geometry.bytes(), "what its meshes show")?;
-    // Triangles to be shared may be left that no object shows.
+    // Shared triangles may remain that no object uses.
     if geometry.objects.is_empty() {
         return Err(
             "no triangles: all of them are too narrow to have an area in the scene's size; nothing is left to render"

@@ -1,4 +1,4 @@
-//! What the vertices of a primitive have.
+//! Vertex attributes of a primitive.
 
 use glam::{DVec3, DVec4, Vec2, Vec4};
 use gltf_json::mesh::{Primitive, Semantic};
@@ -10,7 +10,7 @@ use crate::loader::diagnostic::{Check, damaged};
 use crate::loader::file::accessor::{DIRECTIONS, FRACTIONS, Integers, POSITIONS, TEXCOORDS, Vectors};
 use crate::loader::file::document::Document;
 
-/// The attributes of a primitive's vertices, as many of each as there are positions.
+/// The attributes of a primitive's vertices, one of each per position.
 pub(crate) struct Attributes<'a> {
     positions: Vectors<'a, 3>,
     normals: Option<Vectors<'a, 3>>,
@@ -22,7 +22,7 @@ pub(crate) struct Attributes<'a> {
     morph_targets: Vec<MorphTarget<'a>>,
 }
 
-/// Something that isn't finite.
+/// A value that is not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct NotFinite;
 
@@ -100,8 +100,7 @@ impl<'a> Attributes<'a> {
         Err(damaged(format_args!("the position of vertex {vertex} isn't finite")))
     }
 
-    /// Normal of a vertex in the mesh's space as the file gives it, morphed and checked to be finite; `None` where it
-    /// gives none.
+    /// Normal of a vertex in the mesh's space from the file, morphed and checked to be finite; `None` if the file has none.
     pub(crate) fn normal(&self, vertex: usize, morph: &[(usize, f64)]) -> Check<Option<DVec3>> {
         let Some(normals) = self.normals else {
             return Ok(None);
@@ -124,7 +123,7 @@ impl<'a> Attributes<'a> {
         self.tangents.is_some()
     }
 
-    /// Tangent of a vertex in the mesh's space as the file gives it, morphed; `None` where it gives none.
+    /// Tangent of a vertex in the mesh's space from the file, morphed; `None` if the file has none.
     pub(crate) fn tangent(&self, vertex: usize, morph: &[(usize, f64)]) -> Option<Result<DVec4, NotFinite>> {
         let tangent = DVec4::from(self.tangents?.get(vertex));
         let shift = self.shift(vertex, morph, |target| target.tangents);
@@ -136,7 +135,7 @@ impl<'a> Attributes<'a> {
         })
     }
 
-    /// Texture coordinates of a vertex, those of a missing set zero; `None` where the file gives none.
+    /// Texture coordinates of a vertex, zero for a missing set; `None` if the file has none.
     pub(crate) fn texcoords(&self, vertex: usize) -> Option<Result<[Vec2; 2], NotFinite>> {
         if !self.has_texcoords() {
             return None;
@@ -153,13 +152,13 @@ impl<'a> Attributes<'a> {
         })
     }
 
-    /// Colour of a vertex, linear RGBA, not negative; `None` where the file gives none.
+    /// Colour of a vertex, linear RGBA, not negative; `None` if the file has none.
     pub(crate) fn color(&self, vertex: usize) -> Option<Result<Vec4, NotFinite>> {
         let color = self.colors?.finite(vertex).ok_or(NotFinite);
         Some(color.map(|color| Vec4::from(color.map(|value| value as f32)).max(Vec4::ZERO)))
     }
 
-    /// Sum of what morph targets add to an attribute of a vertex, by their weights.
+    /// Weighted sum of the morph targets' displacements of a vertex attribute.
     fn shift(
         &self,
         vertex: usize,
@@ -199,7 +198,7 @@ fn influences<'a>(
     Ok(sets)
 }
 
-/// Opens an attribute that a primitive may have, checked to be there `count` times.
+/// Opens an optional attribute of a primitive, checked to have `count` elements.
 pub(crate) fn optional<'a, const N: usize>(
     name: &str,
     plural: &str,

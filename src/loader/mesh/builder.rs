@@ -29,7 +29,7 @@ pub(crate) struct Shared {
     dropped: usize,
 }
 
-/// What of an instance is shared.
+/// The shared part of an instance.
 struct Placed {
     triangles: Range<u32>,
     placement: Placement,
@@ -38,25 +38,25 @@ struct Placed {
 
 /// Grows a [`Geometry`] by one instance after another.
 pub(crate) struct Builder {
-    /// What there is so far.
+    /// The geometry so far.
     pub geometry: Geometry,
     /// Vertices whose normal had no length and was replaced.
     pub zero_normals: usize,
-    /// Texture coordinates, colours and tangents that weren't finite and were left out.
+    /// Texture coordinates, colours and tangents that were not finite and were left out.
     pub not_finite: usize,
     /// Whether instances share triangles.
     pub shares: bool,
     /// Triangles that they share, by mesh and primitive.
     pub shared: HashMap<(usize, usize), Shared>,
-    /// For each vertex of the primitive in hand, its index in the scene, or [`UNSEEN`]. Kept between primitives, and
-    /// cleared only where it was written: many primitives may use small parts of one large accessor.
+    /// For each vertex of the current primitive, its index in the scene, or [`UNSEEN`]. Reused for all primitives, and cleared
+    /// only where it was written: many primitives may use small parts of one large accessor.
     scene_vertices: Vec<u32>,
-    /// Where `scene_vertices` was written.
+    /// The written elements of `scene_vertices`.
     seen: Vec<usize>,
 }
 
 impl Builder {
-    /// A builder that has no objects yet.
+    /// An empty builder.
     pub(crate) fn new(normalisation: Normalisation, shares: bool) -> Self {
         Self {
             geometry: Geometry {
@@ -80,7 +80,7 @@ impl Builder {
         }
     }
 
-    /// Bytes of what there is, and of an instance beside it at the least.
+    /// Size of the geometry so far, plus the minimum for another instance, in bytes.
     pub(crate) fn bytes_with(&self, instance: &MeshInstance<'_>) -> u64 {
         let more = if self.shared.contains_key(&instance.key()) {
             0
@@ -92,7 +92,7 @@ impl Builder {
         self.geometry.bytes() + more as u64
     }
 
-    /// Adds an instance as an object, unless nothing of it is left. Returns how many triangles were dropped.
+    /// Adds an instance as an object, unless it has no triangles left. Returns the number of dropped triangles.
     pub(crate) fn add(&mut self, root: &Root, instance: &MeshInstance<'_>) -> Check<usize> {
         let object = |triangles, placement| Object {
             name: instance.name(root),
@@ -122,9 +122,8 @@ impl Builder {
         Ok(dropped)
     }
 
-    /// Puts the shared triangles of an instance's primitive where its node has them; `None` where it has to have triangles of
-    /// its own: those that emit are lights, skins and morph targets give every node other ones, and of what is nearly flat or
-    /// hardly there rounding would leave nothing.
+    /// Places the shared triangles of an instance's primitive by its node; `None` if it needs its own triangles: emissive ones
+    /// are lights, skins and morph targets differ between nodes, and nearly flat or tiny instances would be lost by rounding.
     fn share(&mut self, root: &Root, instance: &MeshInstance<'_>) -> Check<Option<Placed>> {
         let Some(to_world) = shareable(root, instance).filter(|_| self.shares) else {
             return Ok(None);
@@ -160,7 +159,7 @@ impl Builder {
         }))
     }
 
-    /// Adds the triangles of an object in a space. Returns how many were dropped.
+    /// Adds the triangles of an object in a space. Returns the number of dropped ones.
     pub(crate) fn add_triangles(
         &mut self,
         instance: &MeshInstance<'_>,
@@ -208,7 +207,7 @@ impl Builder {
         pad(tangents, positions.len(), NO_TANGENT);
     }
 
-    /// The scene's vertex for a vertex of the primitive in hand. The first triangle that uses it adds it.
+    /// The scene's vertex for a vertex of the current primitive. The first triangle that uses it adds it.
     fn vertex(
         &mut self,
         instance: &MeshInstance<'_>,
@@ -251,7 +250,7 @@ impl Builder {
         Ok(index as u32)
     }
 
-    /// An attribute, or what stands for it where it isn't finite.
+    /// An attribute, or its replacement if it is not finite.
     fn or_left_out<T>(&mut self, attribute: Option<Result<T, NotFinite>>, absent: T) -> Option<T> {
         attribute.map(|value| {
             value.unwrap_or_else(|NotFinite| {
@@ -262,7 +261,7 @@ impl Builder {
     }
 }
 
-/// What vertices have in a scene where others have more.
+/// Default attributes of vertices in a scene where other vertices have them.
 const NO_TEXCOORDS: [Vec2; 2] = [Vec2::ZERO; 2];
 const NO_COLOR: Vec4 = Vec4::ONE;
 const NO_TANGENT: Vec4 = Vec4::ZERO;

@@ -5,12 +5,12 @@ use glam::{DMat3, DVec3, Vec3};
 /// Factor of the f64 rounding unit below which the height of a triangle is rounding noise of its transform.
 const ROUNDING_STEPS: f64 = 16.0;
 
-/// The matrix that takes normals along with a linear map, up to a positive factor, and whether the map mirrors.
+/// The matrix that transforms normals under a linear map, up to a positive factor, and whether the map mirrors.
 ///
 /// It is the cofactor matrix, the inverse transpose times the determinant, which exists for singular maps as well.
 pub(crate) fn normal_matrix(linear: DMat3) -> (DMat3, bool) {
     let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
-    // The largest entry becomes 1, so that the products below neither overflow nor vanish.
+    // The largest entry becomes 1, so that the products below neither overflow nor underflow.
     let largest = [x, y, z]
         .map(|axis| axis.abs().max_element())
         .into_iter()
@@ -21,7 +21,7 @@ pub(crate) fn normal_matrix(linear: DMat3) -> (DMat3, bool) {
     (if is_mirrored { -cofactors } else { cofactors }, is_mirrored)
 }
 
-/// Unit normal of a triangle, or `None` if its height is nothing but rounding error of its coordinates.
+/// Unit normal of a triangle, or `None` if its height is within the rounding error of its coordinates.
 pub(crate) fn face_normal([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
     let edges = [b - a, c - b, a - c];
     let longest = edges

@@ -1,11 +1,11 @@
-//! The triangles that a file shows.
+//! The triangles of a file's scene.
 
 use glam::{Vec2, Vec3, Vec4};
 
 use crate::scene::{Normalisation, Object, Triangle};
 
-/// The triangles of a scene in render space. Vertices have what the fields of the same names of a
-/// [`Scene`](crate::scene::Scene) say.
+/// The triangles of a scene in render space. Vertex attributes are as in the fields of the same names of a
+/// [`Scene`](crate::scene::Scene).
 pub(crate) struct Geometry {
     pub positions: Vec<Vec3>,
     pub normals: Vec<Vec3>,
@@ -14,14 +14,14 @@ pub(crate) struct Geometry {
     pub tangents: Vec<Vec4>,
     pub triangles: Vec<Triangle>,
     pub objects: Vec<Object>,
-    /// Of each object, the index of the node that shows it.
+    /// For each object, the index of its node.
     pub nodes: Vec<usize>,
     pub normalisation: Normalisation,
     pub dropped_triangles: usize,
 }
 
 impl Geometry {
-    /// Bytes that it takes.
+    /// Its size in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         let sizes = [
             size_of_val(&self.positions[..]) + size_of_val(&self.normals[..]),

@@ -1,4 +1,4 @@
-//! `EXT_mesh_gpu_instancing`: a node that shows its mesh many times.
+//! `EXT_mesh_gpu_instancing`: nodes with many instances of their mesh.
 
 use crate::loader::extensions::MESH_INSTANCING;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ struct Instancing {
     attributes: BTreeMap<String, u32>,
 }
 
-/// Where in the world a node's mesh is shown: where the node is, or as often as its instances say.
+/// The transforms of a node's mesh to world space: that of the node, or those of its instances.
 pub(crate) fn places(document: &Document, placed: &PlacedNode<'_>) -> Check<Vec<DAffine3>> {
     let Some(extension) = extension(placed) else {
         return Ok(vec![placed.to_world]);
@@ -53,7 +53,7 @@ impl Instancing {
         ];
         let mut counts = counts.into_iter().flatten();
         let Some(count) = counts.next() else {
-            // It has none of what places an instance.
+            // It has no attribute that places instances.
             return Ok(vec![to_world]);
         };
         if let Some(other) = counts.find(|&other| other != count) {

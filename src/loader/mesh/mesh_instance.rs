@@ -1,4 +1,4 @@
-//! A primitive as one node shows it: morphed, then taken to world space by the node or by the joints of its skin.
+//! A primitive at a node: morphed, then transformed to world space by the node or by the joints of its skin.
 
 use super::primitive::FaceCorner;
 use std::rc::Rc;
@@ -14,7 +14,7 @@ use crate::loader::diagnostic::{Check, damaged, primitive_label};
 use crate::loader::graph::PlacedNode;
 use crate::text::shorten;
 
-/// A primitive, and where a node puts it.
+/// A primitive, and its transform by a node.
 #[derive(Clone)]
 pub(crate) struct MeshInstance<'a> {
     node: &'a PlacedNode<'a>,
@@ -22,7 +22,7 @@ pub(crate) struct MeshInstance<'a> {
     primitive_index: usize,
     /// The primitive, in the mesh's space.
     pub primitive: Rc<Primitive<'a>>,
-    /// Morph targets with the weights that aren't zero.
+    /// Morph targets with weights other than zero.
     morph: Vec<(usize, f64)>,
     deformation: Deformation,
 }
@@ -37,7 +37,7 @@ enum Deformation {
 #[derive(Clone, Copy)]
 struct Map {
     to_world: DAffine3,
-    /// Takes normals along, up to their length.
+    /// The matrix for normals, up to their length.
     normal_matrix: DMat3,
     is_mirrored: bool,
 }
@@ -62,7 +62,7 @@ pub(crate) struct WorldTriangle {
 }
 
 impl<'a> MeshInstance<'a> {
-    /// The primitive as `node` shows it at a place in the world, or else by the skin's matrices if the node has a skin.
+    /// The primitive of `node` with a transform to world space, or with the skin's matrices if the node has a skin.
     pub(crate) fn new(
         node: &'a PlacedNode<'a>,
         to_world: DAffine3,
@@ -91,17 +91,17 @@ impl<'a> MeshInstance<'a> {
         (self.mesh, self.primitive_index)
     }
 
-    /// Index of the node that shows it.
+    /// Index of its node.
     pub(crate) fn node_index(&self) -> usize {
         self.node.index
     }
 
-    /// Whether other nodes show the primitive as well.
+    /// Whether other nodes have the primitive too.
     pub(crate) fn is_repeated(&self) -> bool {
         Rc::strong_count(&self.primitive) > 1
     }
 
-    /// Where it is in the world if only its node puts it there: no skin and no morph target.
+    /// Its transform to world space, if it has neither skin nor morph targets.
     pub(crate) fn node_alone(&self) -> Option<DAffine3> {
         match &self.deformation {
             Deformation::Rigid(map) if self.morph.is_empty() => Some(map.to_world),
@@ -117,7 +117,7 @@ impl<'a> MeshInstance<'a> {
         }
     }
 
-    /// Where it is in the file.
+    /// Its location in the file.
     pub(crate) fn label(&self, root: &Root) -> String {
         primitive_label(self.mesh, &root.meshes[self.mesh], self.primitive_index)
     }
@@ -160,7 +160,7 @@ impl<'a> MeshInstance<'a> {
         Ok(WorldTriangle { corners, positions })
     }
 
-    /// Normal of a vertex in world space, up to its length; `None` where the file gives none.
+    /// Normal of a vertex in world space, up to its length; `None` if the file has none.
     pub(crate) fn normal(&self, vertex: usize) -> Check<Option<DVec3>> {
         match self.primitive.attributes.normal(vertex, &self.morph)? {
             Some(normal) => Ok(Some(self.map(vertex)?.normal_matrix * normal)),
@@ -168,8 +168,8 @@ impl<'a> MeshInstance<'a> {
         }
     }
 
-    /// Unit tangent at a corner in world space and the sign of its bitangent, zero where it has no direction; `None`
-    /// where there is none.
+    /// Unit tangent at a corner in world space and the sign of its bitangent, zero if it has no direction; `None` without
+    /// tangents.
     pub(crate) fn tangent(&self, corner: FaceCorner) -> Check<Option<Result<Vec4, NotFinite>>> {
         let tangent = match self.primitive.generated_tangent(corner) {
             Some(tangent) => Some(Ok(tangent.as_dvec4())),
@@ -232,7 +232,7 @@ impl<'a> MeshInstance<'a> {
     }
 }
 
-/// A tangent follows the surface as its edges do. Mirroring turns normal × tangent round, but not the bitangent.
+/// A tangent is transformed like the edges of the surface. Mirroring reverses normal × tangent, but not the bitangent.
 fn world_tangent(map: Map, tangent: DVec4) -> Vec4 {
     let direction = map.to_world.matrix3 * tangent.truncate();
     let sign = if (tangent.w < 0.0) == map.is_mirrored {

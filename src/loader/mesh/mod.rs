@@ -1,4 +1,4 @@
-//! Meshes: from primitives to the triangles that nodes show.
+//! Meshes: from primitives to the triangles of nodes.
 
 pub(crate) mod assembly;
 pub(crate) mod attributes;

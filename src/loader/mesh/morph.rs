@@ -1,4 +1,4 @@
-//! Morph targets: what is added to the attributes of vertices, by weights (glTF 2.0, section 3.7.2.2).
+//! Morph targets: weighted displacements of vertex attributes (glTF 2.0, section 3.7.2.2).
 
 use gltf_json::mesh::Primitive;
 
@@ -13,7 +13,7 @@ use crate::loader::graph::PlacedNode;
 pub(crate) struct MorphTarget<'a> {
     pub positions: Option<Vectors<'a, 3>>,
     pub normals: Option<Vectors<'a, 3>>,
-    /// The sign of the bitangent stays what it is.
+    /// The sign of the bitangent does not change.
     pub tangents: Option<Vectors<'a, 3>>,
 }
 
@@ -42,7 +42,7 @@ impl<'a> MorphTarget<'a> {
     }
 }
 
-/// Of `targets` morph targets, those whose weights aren't zero: by an animation, or else the node, or else the mesh.
+/// The morph targets among `targets` with weights other than zero, from an animation, otherwise the node, otherwise the mesh.
 pub(crate) fn weights(
     placed: &PlacedNode<'_>,
     pose: &Pose<'_>,

@@ -1,4 +1,4 @@
-//! Render space: where it lies in world space.
+//! The map from world space to render space.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -11,7 +11,7 @@ use super::mesh_instance::MeshInstance;
 use crate::loader::diagnostic::Check;
 use crate::scene::Normalisation;
 
-/// Finds render space from the bounds of all triangles that have an area.
+/// Derives render space from the bounds of all triangles with an area.
 pub(crate) fn normalise(root: &Root, instances: &[MeshInstance<'_>]) -> Check<Normalisation> {
     let mut lower = DVec3::INFINITY;
     let mut upper = DVec3::NEG_INFINITY;
@@ -34,7 +34,7 @@ pub(crate) fn normalise(root: &Root, instances: &[MeshInstance<'_>]) -> Check<No
             }
             continue;
         };
-        // Read once, whatever the number of nodes.
+        // Read once for any number of nodes.
         let unplaced: &mut Vec<[DVec3; 3]> = match repeated.entry(instance.key()) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => {

@@ -1,4 +1,4 @@
-//! A mesh primitive as a list of triangles, whatever its topology and index type.
+//! A mesh primitive as a list of triangles, for any topology and index type.
 
 use glam::Vec4;
 use gltf_json::mesh;
@@ -12,15 +12,15 @@ use crate::loader::diagnostic::{Check, Warnings, damaged};
 use crate::loader::file::accessor::Integers;
 use crate::loader::file::document::Document;
 
-/// A primitive whose accessors were checked. Only its indices and vertices are still to be.
+/// A primitive with checked accessors; its indices and vertices are checked when they are read.
 pub(crate) struct Primitive<'a> {
     /// Index of the material, or one past the last for the default material.
     pub material: usize,
-    /// What its vertices have.
+    /// Its vertex attributes.
     pub attributes: Attributes<'a>,
     topology: Topology,
     indices: Option<Integers<'a, 1>>,
-    /// Tangents of the corners of each triangle, where the file has none and the material needs them.
+    /// Tangents of the corners of each triangle, if the file has none and the material needs them.
     generated_tangents: Option<Vec<[Vec4; 3]>>,
 }
 
@@ -44,7 +44,7 @@ enum Topology {
 }
 
 impl<'a> Primitive<'a> {
-    /// Opens a primitive; `None` if it has no triangles. Parts that aren't supported are added to `warnings`.
+    /// Opens a primitive; `None` if it has no triangles. Unsupported parts are added to `warnings`.
     pub(crate) fn open(
         document: &'a Document,
         primitive: &mesh::Primitive,
@@ -126,7 +126,7 @@ impl<'a> Primitive<'a> {
     pub(crate) fn triangle(&self, triangle: usize) -> Check<[usize; 3]> {
         let corners = match self.topology {
             Topology::List => [3 * triangle, 3 * triangle + 1, 3 * triangle + 2],
-            // Every other triangle of a strip is turned round, so that all face the same way.
+            // Every second triangle of a strip is reversed, so that all face the same way.
             Topology::Strip => [triangle, triangle + 1 + triangle % 2, triangle + 2 - triangle % 2],
             Topology::Fan => [triangle + 1, triangle + 2, 0],
         };
@@ -148,7 +148,7 @@ impl<'a> Primitive<'a> {
         self.generated_tangents.is_some()
     }
 
-    /// The tangent at a corner where the file has none, in the mesh's space.
+    /// The generated tangent at a corner, in the mesh's space.
     pub(crate) fn generated_tangent(&self, corner: FaceCorner) -> Option<Vec4> {
         let tangents = self.generated_tangents.as_ref()?;
         Some(tangents[corner.triangle][corner.place])

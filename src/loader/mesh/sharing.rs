@@ -1,4 +1,4 @@
-//! Primitives that several nodes show, whose triangles are stored once.
+//! Primitives of several nodes, whose triangles are stored once.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -11,21 +11,21 @@ use super::geometry::Geometry;
 use super::mesh_instance::MeshInstance;
 use crate::scene::{Normalisation, Placement};
 
-/// Triangles of a primitive that is worth sharing. Fewer hardly take memory, and walls made of equal parts stay watertight
-/// where those meet.
+/// Minimum number of triangles of a shared primitive. Smaller ones take little memory, and walls made of equal parts remain
+/// watertight at their joints if they are not shared.
 const FEWEST: usize = 32;
-/// A scene shares triangles if it saves one in so many: rays take an eighth longer where they pass a transform (measured with
+/// A scene shares triangles if that saves at least one in this number: rays take an eighth longer with a transform (measured with
 /// primitives of 48 to 1,000 triangles).
 const ONE_SAVED_IN: usize = 4;
 
-/// Where an instance is whose triangles others may share.
+/// The placement of an instance whose triangles others may share.
 pub(crate) fn shareable(root: &Root, instance: &MeshInstance<'_>) -> Option<DAffine3> {
     let primitive = &instance.primitive;
     let may_be = instance.is_repeated() && primitive.triangle_count() >= FEWEST && !emits(root, primitive.material);
     instance.node_alone().filter(|_| may_be)
 }
 
-/// Whether the instances have so many triangles in common that sharing them is worth its price.
+/// Whether the instances have enough triangles in common for sharing to pay.
 pub(crate) fn is_worth_it(root: &Root, instances: &[MeshInstance<'_>]) -> bool {
     let (mut all, mut saved) = (0, 0);
     let mut known = HashSet::new();
@@ -53,7 +53,7 @@ pub(crate) fn placed(space: Normalisation, to_world: DAffine3, world: Normalisat
     }
 }
 
-/// Whether all triangles have an area where they are put.
+/// Whether all placed triangles have an area.
 pub(crate) fn stays_whole(geometry: &Geometry, triangles: &Range<u32>, placement: Placement) -> bool {
     let mut triangles = geometry.triangles[triangles.start as usize..triangles.end as usize].iter();
     triangles.all(|triangle| {

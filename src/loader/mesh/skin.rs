@@ -1,4 +1,4 @@
-//! Skins: where the joints of a mesh take its vertices (glTF 2.0, section 3.7.3).
+//! Skins: transforms of vertices by joints (glTF 2.0, section 3.7.3).
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -13,11 +13,11 @@ use crate::loader::graph::{PlacedNode, affine_from, node_label};
 /// For each joint of a skin, the map from the mesh's space to world space.
 pub(crate) type JointMatrices = Rc<[DAffine3]>;
 
-/// The skins of a file, each made when a node first asks for it.
+/// The skins of a file, each built at its first use.
 pub(crate) struct Skins<'a> {
     document: &'a Document,
     nodes: &'a [PlacedNode<'a>],
-    /// Place in `nodes` by index in the file.
+    /// Index in `nodes` by index in the file.
     places: HashMap<usize, usize>,
     made: HashMap<usize, JointMatrices>,
 }
@@ -34,7 +34,7 @@ impl<'a> Skins<'a> {
         }
     }
 
-    /// The matrices of the skin at `index`. The node that shows the mesh plays no part in them.
+    /// The matrices of the skin at `index`. The transform of the mesh's node is ignored.
     pub(crate) fn matrices(&mut self, index: usize) -> Check<JointMatrices> {
         if let Some(matrices) = self.made.get(&index) {
             return Ok(matrices.clone());

@@ -1,5 +1,5 @@
-//! Glass without a volume is a thin wall by the specification, but often means a solid: `LoadOptions::solid_glass` takes it
-//! as such where its mesh is closed.
+//! Glass without a volume is a thin wall by the specification, but is often meant as a solid: `LoadOptions::solid_glass` treats
+//! it as such if its mesh is closed.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -20,7 +20,7 @@ pub(crate) fn thin_glass(materials: &[Material], used: &[bool]) -> Vec<usize> {
     indices.collect()
 }
 
-/// What is to be said of them, if they stay as they are.
+/// The note about them, if they remain thin walls.
 pub(crate) fn note(root: &Root, thin: &[usize]) -> Option<Remark> {
     (!thin.is_empty()).then(|| {
         let what = format!(
@@ -39,7 +39,7 @@ fn labels(root: &Root, indices: &[usize]) -> Vec<String> {
     indices.iter().map(of).collect()
 }
 
-/// Gives objects of thin glass whose mesh is closed a solid material, and tells which stay thin.
+/// Gives objects of thin glass with a closed mesh a solid material, and reports those that remain thin.
 pub(crate) fn make_solid(
     root: &Root,
     geometry: &mut Geometry,
@@ -55,7 +55,7 @@ pub(crate) fn make_solid(
     let mut open = Vec::new();
     let mut known: HashMap<u32, bool> = HashMap::new();
     for objects in of_nodes.values() {
-        // The mesh as a whole, where one of its primitives alone isn't closed.
+        // The mesh as a whole, if one of its primitives alone is not closed.
         let mut whole = None;
         for &index in objects {
             let object = &geometry.objects[index];
@@ -88,7 +88,7 @@ pub(crate) fn make_solid(
     }))
 }
 
-/// Whether each edge of objects together lies between faces that look to the same side, which is outwards.
+/// Whether the objects together are closed: each edge lies between two faces of consistent orientation, facing outwards.
 fn is_closed(geometry: &Geometry, objects: &[usize]) -> bool {
     let mut balance: HashMap<[[u32; 3]; 2], i64> = HashMap::new();
     let mut volume = 0.0;
@@ -104,10 +104,10 @@ fn is_closed(geometry: &Geometry, objects: &[usize]) -> bool {
             });
             let origin = *first.get_or_insert(corners[0].as_dvec3());
             let [a, b, c] = corners.map(|corner| corner.as_dvec3() - origin);
-            // Where fronts become backs, the renderer turns them round.
+            // Mirrored instances exchange front and back; the renderer turns their faces round.
             let mirrored = placement.is_some_and(|placement| placement.is_mirrored());
             volume += DVec3::dot(a, b.cross(c)) * if mirrored { -1.0 } else { 1.0 };
-            // −0 and 0 are one place.
+            // −0 and 0 are equal.
             let keys = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
             for (from, to) in [(0, 1), (1, 2), (2, 0)] {
                 let (from, to) = (keys[from], keys[to]);

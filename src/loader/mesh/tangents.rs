@@ -1,4 +1,4 @@
-//! Tangents by MikkTSpace where a file has none and a normal texture needs them (glTF 2.0, section 3.7.2.1).
+//! Tangents by MikkTSpace, if a file has none and a normal texture needs them (glTF 2.0, section 3.7.2.1).
 
 use std::collections::HashMap;
 
@@ -9,10 +9,10 @@ use super::attributes::Attributes;
 use super::facet::face_normal;
 use crate::loader::diagnostic::Check;
 
-/// The most triangles around one vertex: the algorithm visits them by recursion.
+/// Maximum number of triangles around one vertex: the algorithm visits them recursively.
 pub(crate) const MAX_AROUND: u32 = 4096;
 
-/// The triangles of a primitive as the algorithm reads them.
+/// The triangles of a primitive, for the algorithm.
 struct Corners {
     positions: Vec<[Vec3; 3]>,
     normals: Vec<[Vec3; 3]>,
@@ -20,8 +20,8 @@ struct Corners {
     tangents: Vec<[Vec4; 3]>,
 }
 
-/// Tangents of the corners of triangles, given by their vertices, for the texture coordinates of a set, as the file would have them; zero where
-/// there is none. `None` if more than [`MAX_AROUND`] triangles meet in a point.
+/// Tangents of the corners of triangles, given by their vertices, for the texture coordinates of a set, in the file's convention;
+/// zero if undefined. `None` if more than [`MAX_AROUND`] triangles share a point.
 pub(crate) fn tangents(
     attributes: &Attributes<'_>,
     triangles: impl ExactSizeIterator<Item = Check<[usize; 3]>>,
@@ -63,12 +63,12 @@ pub(crate) fn tangents(
         corners.texcoords.push(texcoords);
     }
     corners.scale_to_1();
-    // There is no way for it to fail yet; without tangents is what it leaves then.
+    // It cannot fail at present; otherwise there are no tangents.
     Ok(generate_tangents(&mut corners).ok().map(|()| corners.tangents))
 }
 
 impl Corners {
-    /// Scales positions and texture coordinates, which changes no direction, so that products don't leave f32's range.
+    /// Scales positions and texture coordinates, which changes no direction, so that products stay within f32's range.
     fn scale_to_1(&mut self) {
         let positions = self.positions.as_flattened_mut();
         let largest = positions.iter().map(|position| position.abs().max_element());
@@ -107,7 +107,7 @@ impl Geometry for Corners {
             return;
         };
         let [x, y, z, sign] = space.tangent_encoded();
-        // glTF's v runs down the picture, but the green of its normal textures points up: the other bitangent.
+        // glTF's v points down in the picture, but the green of its normal textures points up: the bitangent is reversed.
         let tangent = Vec4::new(x, y, z, -sign);
         if tangent.is_finite() {
             self.tangents[face][vert] = tangent;
