@@ -1,5 +1,5 @@
 //! Compiles the kernels in `glsl/stages`, `glsl/ladder` and, for tests, `glsl/probes` to SPIR-V, reflects what each stage binds,
-//! and writes the `shaders` module. What host and kernels share, `layout.glsl` and `settings.glsl`, is generated.
+//! and writes the `shaders` module. The shared layout, `layout.glsl` and `settings.glsl`, is generated.
 //!
 //! A block's name in GLSL is its buffer's name in [`BufferId`](src/stage.rs): a name without a variant of that enum
 //! fails the compilation of the generated module. Bindings are numbered by the compiler and never written by hand.
@@ -35,7 +35,7 @@ fn main() -> Result<()> {
     sources.retain(|path| path.extension().is_some_and(|extension| extension == "comp"));
     sources.sort();
 
-    // For whoever wants to read them, or compile a stage with another tool.
+    // For readers, and to compile a stage with another tool.
     for name in layout::INCLUDES {
         fs::write(
             out.join(name),
@@ -119,18 +119,24 @@ fn by_query_text(text: &str) -> Result<String> {
     ))
 }
 
-/// Names and bindings of the first descriptor set.
+/// Bindings of the first descriptor set, with their buffers' names.
 fn slots(entry_point: &EntryPoint) -> BTreeMap<u32, String> {
     let slot = |variable: &Variable| match variable {
-        Variable::Descriptor { name, desc_bind, .. } if desc_bind.set() == 0 => {
-            Some((desc_bind.bind(), name.clone().unwrap_or_default()))
+        Variable::Descriptor {
+            name, desc_bind, ty, ..
+        } if desc_bind.set() == 0 => {
+            let name = match ty {
+                Type::Struct(block) => block.name(),
+                _ => name.as_deref(),
+            };
+            Some((desc_bind.bind(), name.unwrap_or_default().to_owned()))
         }
         _ => None,
     };
     entry_point.vars.iter().filter_map(slot).collect()
 }
 
-/// The stage with rays that the device traces itself, if it traces any: a module that other devices can't load.
+/// The stage with ray queries, if it traces rays: a module that other devices can't load.
 fn with_ray_query(
     compiler: &shaderc::Compiler,
     text: &str,
@@ -172,7 +178,7 @@ fn options(root: &Path, level: shaderc::OptimizationLevel) -> Result<shaderc::Co
     Ok(options)
 }
 
-/// `unused`: also what the kernel declares and doesn't use.
+/// `unused`: includes declarations that the kernel does not use.
 fn reflect(spirv: &[u32], unused: bool) -> Result<EntryPoint> {
     let mut entry_points = ReflectConfig::new()
         .spv(spirv)
@@ -187,7 +193,7 @@ fn reflect(spirv: &[u32], unused: bool) -> Result<EntryPoint> {
     Ok(entry_points.remove(0))
 }
 
-/// Every binding of the optimised module must have been reflected: one that is passed to a function isn't seen.
+/// Every binding of the optimised module must have been reflected: reflection does not see one that is passed to a function.
 fn check_bindings(spirv: &[u32], entry_point: &EntryPoint) -> Result<()> {
     const OP_DECORATE: u32 = 71;
     const BINDING: u32 = 33;
@@ -350,7 +356,7 @@ fn access_name(access: AccessType) -> &'static str {
     }
 }
 
-/// The struct that a block holds, one or many of, or the block itself.
+/// The struct of a block's content or elements, or the block itself.
 fn element(block: &StructType) -> &StructType {
     match block.members.as_slice() {
         [member] => match &member.ty {

@@ -1,4 +1,5 @@
-//! GLSL of what host and kernels share: `src/layout`, which is compiled into this build script too.
+//! Generates GLSL from `src/layout`, the structs and constants shared by host and kernels, which is compiled into this build
+//! script too.
 
 use std::fmt::Write as _;
 
@@ -9,17 +10,17 @@ mod shared;
 use shared::constants::{self, Number};
 use shared::{FieldLayout, Layout, Scalar, Shape, layouts};
 
-/// The struct that kernels see as a uniform block instead.
+/// The struct that is a uniform block in kernels.
 const UNIFORM: &str = "Settings";
 
 fn structs() -> impl Iterator<Item = &'static Layout> {
     layouts().filter(|layout| layout.name != UNIFORM)
 }
 
-/// Files that [`include`] has.
+/// Names of the files of [`include`].
 pub const INCLUDES: [&str; 2] = ["layout.glsl", "settings.glsl"];
 
-/// The file that kernels include by this name, if it is generated.
+/// The generated file that kernels include by this name, if any.
 pub fn include(name: &str) -> Option<String> {
     match name {
         "layout.glsl" => Some(constants_and_structs()),
@@ -28,7 +29,7 @@ pub fn include(name: &str) -> Option<String> {
     }
 }
 
-/// A kernel that binds a buffer of each struct: what it reflects tells how they are laid out in memory.
+/// A kernel that binds a buffer of each struct: its reflection shows their memory layout.
 pub fn probe() -> String {
     let mut glsl = String::from("#version 460\n#extension GL_GOOGLE_include_directive : require\n");
     glsl += "layout(local_size_x = 1) in;\n#include \"layout.glsl\"\n";
@@ -72,7 +73,7 @@ fn members(layout: &Layout) -> String {
     layout.fields.iter().map(member).collect()
 }
 
-/// A shape's type in GLSL, and what follows the field's name.
+/// A shape's type in GLSL, and the suffix of the field's name.
 fn type_of(Shape { scalar, columns, rows }: Shape) -> (String, String) {
     let (one, vector) = match scalar {
         Scalar::Uint => ("uint", "uvec"),
@@ -82,14 +83,14 @@ fn type_of(Shape { scalar, columns, rows }: Shape) -> (String, String) {
         (1, 1) => (one.to_owned(), String::new()),
         (2..=4, 1) => (format!("{vector}{columns}"), String::new()),
         (_, 1) => (one.to_owned(), format!("[{columns}]")),
-        // GLSL names it by its columns, which here lie one after the other.
+        // GLSL's type names the columns, which are contiguous here.
         _ => (format!("mat{rows}x{columns}"), String::new()),
     }
 }
 
 /// Macros that read a struct out of a texel buffer: the i-th one, `PHOTON(buffer, i)`, or the i-th one after so many texels,
-/// `PHOTON_AFTER(buffer, texels, i)`. What isn't used of it isn't loaded. (Macros, since a texel buffer that is passed to a function
-/// escapes the reflection.) None for a struct that isn't made of whole texels.
+/// `PHOTON_AFTER(buffer, texels, i)`. Unused fields are not loaded. (Macros, because reflection does not see a texel buffer that
+/// is passed to a function.) None for a struct that is not made of whole texels.
 fn reader(layout: &Layout) -> Option<String> {
     if !layout.size.is_multiple_of(16) {
         return None;

@@ -1,4 +1,4 @@
-//! Puts PNGs of one size beside each other on a sheet: `cargo run --example contact_sheet -- SHEET.png PICTURE.png ...`
+//! Combines PNGs of one size into a contact sheet: `cargo run --example contact_sheet -- SHEET.png PICTURE.png ...`
 
 use anyhow::{Context, Result, ensure};
 use image::{GenericImage, RgbImage};

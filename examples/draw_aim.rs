@@ -1,10 +1,9 @@
-//! Draws where photon paths of a source have learned to start:
+//! Draws the learned distribution of starts of a source's photon paths:
 //! `cargo run --release --example draw_aim -- SCENE.gltf OUT.png [ITERATIONS]`
-//!
-//! Of a directional light, its starts on the plane across its rays: the scene, and ever less of it around the smallest target,
-//! targets outlined. A place's colour is the density of its starts over that by power, on a logarithmic scale. Without a
-//! directional light, the unit square that directions are chosen by, of the target that most paths of the first source are
-//! aimed at, over an even density. In the strip below, colours from the least to the largest density, which are printed.
+//! For a directional light: its starts on the plane across its rays, for the whole scene and closer around the smallest target,
+//! with targets outlined. Colours show the density of starts relative to that by power, on a logarithmic scale. Without a
+//! directional light: the unit square of directions towards the target that most paths of the first source are aimed at, relative
+//! to a uniform density. The strip below shows the colours from the least to the largest density, which are printed.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -26,7 +25,7 @@ use ppm_vk::internals::scene::Scene;
 const SIDE: usize = 256;
 /// Pixels between panels.
 const GAP: usize = 4;
-/// From the least density to the largest.
+/// Colours from the least density to the largest.
 const COLOURS: [[f64; 3]; 5] = [
     [10.0, 8.0, 40.0],
     [80.0, 20.0, 110.0],
@@ -72,7 +71,7 @@ fn main() -> Result<()> {
     draw(&panels, Path::new(&out))
 }
 
-/// The part of all paths that start in a cell.
+/// The share of paths that start in a cell.
 fn probability(cell: &EmissionCell) -> f64 {
     let volume = cell.size.iter().product::<f32>() * cell.size_light;
     f64::from(volume) / f64::from(cell.weight)
@@ -140,7 +139,7 @@ impl Starts<'_> {
         views.map(draw).to_vec()
     }
 
-    /// The panel of the unit square that directions are chosen by, of the target that most paths are aimed at.
+    /// The panel of the unit square of directions towards the target that most paths are aimed at.
     fn directions(&self) -> Panel {
         let part = |target| self.towards(target).map(|cell| probability(cell)).sum::<f64>();
         let targets = 0..=self.table.spheres.len() as u32;
@@ -151,7 +150,7 @@ impl Starts<'_> {
     }
 }
 
-/// Of a square from −1 to 1.
+/// A point of a square from −1 to 1.
 fn panel(density: impl Fn(DVec2) -> f64) -> Panel {
     let place = |i: usize| (i as f64 + 0.5) / SIDE as f64 * 2.0 - 1.0;
     let pixels = 0..SIDE * SIDE;
@@ -170,7 +169,7 @@ fn square_point(p: DVec2) -> DVec2 {
     square.clamp(DVec2::ZERO, DVec2::splat(1.0 - 1e-9))
 }
 
-/// Panels beside each other, the strip of colours below them.
+/// Panels side by side, with the strip of colours below.
 fn draw(panels: &[Panel], out: &Path) -> Result<()> {
     let densities = panels.iter().flatten().filter(|&&density| density > 0.0);
     let (low, high) = densities.fold((f64::INFINITY, 0.0f64), |(low, high), &d| (low.min(d), high.max(d)));

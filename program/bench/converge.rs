@@ -7,24 +7,24 @@ use serde::Serialize;
 use super::slope_text;
 use ppm_vk::{Camera, DeviceDescription, Image, Platform, PreparedScene, RenderConfig, Result, Session, compare};
 
-/// Iterations before which errors aren't taken for the fit: the radius has hardly moved.
+/// First iterations, which are excluded from the fit: the radius has hardly changed.
 const FIRST_FITTED: u32 = 4;
 
-/// What is rendered, and for how long.
+/// The parameters of a measurement.
 pub struct Converge<'a> {
     /// The scene.
     pub scene: &'a PreparedScene,
     /// Its camera.
     pub camera: &'a Camera,
-    /// What it runs on.
+    /// The platform.
     pub platform: Platform,
-    /// What the pictures should be; its size is theirs.
+    /// The reference; pictures have its size.
     pub reference: &'a Image,
     /// Seconds of rendering, for each setting.
     pub seconds: f64,
     /// Settings and their names.
     pub settings: Vec<(String, RenderConfig)>,
-    /// Asked after every iteration; what has been measured by then counts.
+    /// Whether to stop; called after every iteration. Measurements so far are kept.
     pub stop: &'a dyn Fn() -> bool,
 }
 
@@ -40,14 +40,14 @@ pub struct Curve {
     pub slope: Option<f64>,
 }
 
-/// Error after so many iterations.
+/// The error after a number of iterations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Measured {
     /// Iterations.
     pub iterations: u32,
-    /// Seconds that the device was busy.
+    /// Device time in seconds.
     pub device_s: f64,
-    /// Seconds on the clock, pictures and comparisons left out.
+    /// Wall-clock time in seconds, excluding pictures and comparisons.
     pub wall_s: f64,
     /// relMSE.
     pub rel_mse: f64,
@@ -55,25 +55,25 @@ pub struct Measured {
     pub rmse: f64,
     /// The picture's mean over the reference's.
     pub mean_ratio: [f64; 3],
-    /// Root of relMSE as the render estimates it by itself.
+    /// Root of relMSE, estimated by the render.
     pub estimated_error: Option<f64>,
-    /// 1 / (relMSE · device seconds); infinite where the picture is the reference.
+    /// 1 / (relMSE · device seconds); infinite if the picture equals the reference.
     pub efficiency: f64,
 }
 
 /// All curves.
 #[derive(Debug, Clone, Serialize)]
 pub struct Convergence {
-    /// Where.
+    /// The device.
     pub device: DeviceDescription,
     /// One for each setting.
     pub curves: Vec<Curve>,
 }
 
-/// Renders with each setting; `note` hears what it is doing, `measured` gets all that is known after each measurement.
+/// Renders with each setting; `note` gets progress messages, `measured` all results after each measurement.
 ///
 /// # Errors
-/// Whatever a render can meet, and `measured`'s own.
+/// Errors of a render, and those of `measured`.
 pub fn converge(
     what: &Converge,
     note: &dyn Fn(&str),
@@ -100,7 +100,7 @@ pub fn converge(
     Ok(())
 }
 
-/// Adds points to the last curve for as long as there is time.
+/// Adds points to the last curve until the time is over.
 fn follow(
     what: &Converge,
     session: &mut Session,
@@ -149,18 +149,18 @@ fn follow(
     }
 }
 
-/// When a curve reaches an error.
+/// The time at which a curve reaches an error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reached {
-    /// After so many seconds of the device.
+    /// After this device time, in seconds.
     After(f64),
-    /// With the first measurement: within so many seconds.
+    /// At the first measurement: within this time, in seconds.
     Within(f64),
-    /// Not as long as it was measured.
+    /// Not within the measurement.
     Never,
 }
 
-/// When a curve reaches this relMSE, between its points on the log-log line.
+/// The time at which a curve reaches this relMSE, interpolated on the log-log line.
 pub fn seconds_to(curve: &Curve, rel_mse: f64) -> Reached {
     let mut before: Option<&Measured> = None;
     for point in &curve.points {
@@ -202,7 +202,7 @@ pub fn csv(convergence: &Convergence) -> String {
     text
 }
 
-/// The curves as a table; the first setting is what the others are measured by.
+/// The curves as a table; the others are compared with the first setting.
 pub fn converge_table(convergence: &Convergence) -> String {
     let mut text = format!(
         "on {} ({})\n{:<28} {:>10} {:>10} {:>10} {:>12} {:>10} {:>10} {:>11}\n",

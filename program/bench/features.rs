@@ -1,4 +1,4 @@
-//! What each of the scene's features costs: the kernels as the scene needs them against kernels that know one thing more.
+//! The cost of features: kernels specialised for the scene against kernels with one more feature compiled in.
 
 use std::fmt::Write as _;
 
@@ -11,31 +11,31 @@ use ppm_vk::{Camera, DeviceDescription, Platform, PreparedScene, RenderConfig, R
 /// Times of all sets of features.
 #[derive(Debug, Clone, Serialize)]
 pub struct FeatureCosts {
-    /// Where.
+    /// The device.
     pub device: DeviceDescription,
-    /// What the scene has.
+    /// Features of the scene.
     pub own: Vec<String>,
-    /// Milliseconds of an iteration as the scene needs it.
+    /// Milliseconds of an iteration with the scene's features.
     pub own_ms: f64,
-    /// One for each feature that the scene hasn't, and one for all of them.
+    /// One for each feature that the scene does not have, and one for all of them.
     pub added: Vec<AddedFeature>,
 }
 
-/// A feature that was compiled in without need.
+/// A feature that was compiled in unnecessarily.
 #[derive(Debug, Clone, Serialize)]
 pub struct AddedFeature {
     /// Its name.
     pub feature: String,
     /// Milliseconds of an iteration.
     pub ms: f64,
-    /// The median of its iterations over the scene's own, taken in turns.
+    /// The median ratio of its iterations to those with the scene's features, interleaved.
     pub ratio: f64,
 }
 
-/// Renders with each set of features in turns; `note` hears what it is doing.
+/// Renders with each set of features, interleaved; `note` gets progress messages.
 ///
 /// # Errors
-/// Whatever a render can meet.
+/// Errors of a render.
 pub fn feature_costs(
     scene: &PreparedScene,
     camera: &Camera,
@@ -63,7 +63,7 @@ pub fn feature_costs(
             ..packed.clone()
         });
         let mut session = Session::new(&scene, camera, config, platform)?;
-        // The first iteration compiles, and finds out how much room photons need.
+        // The first iteration compiles, and measures the size of photon buffers.
         session.iterate(&|| false)?;
         sessions.push(session);
     }

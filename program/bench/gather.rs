@@ -16,16 +16,16 @@ use ppm_vk::internals::sizes::{Probe, Sizes};
 use ppm_vk::internals::stage::BufferId;
 use ppm_vk::{Camera, DeviceDescription, Error, Platform, PreparedScene, RenderConfig, Result, Run, Session};
 
-/// Microseconds that one gather may take; a slower method is measured on a share of the visible points.
+/// Maximum time of one gather, in microseconds; a slower method is measured on a share of the visible points.
 const BUDGET_US: f64 = 1e6;
 
-/// What is measured.
+/// The parameters of a measurement.
 pub struct GatherBench<'a> {
     /// The scene.
     pub scene: &'a PreparedScene,
     /// Its camera.
     pub camera: &'a Camera,
-    /// What it runs on.
+    /// The platform.
     pub platform: Platform,
     /// Everything but the resolution.
     pub config: RenderConfig,
@@ -37,12 +37,12 @@ pub struct GatherBench<'a> {
     pub repeats: usize,
 }
 
-/// What a bench found out.
+/// The results of a bench.
 #[derive(Debug, Clone, Serialize)]
 pub struct Results {
-    /// Where.
+    /// The device.
     pub device: DeviceDescription,
-    /// Bytes a second that a copying kernel reads and writes, both counted.
+    /// Bytes per second that a copying kernel reads and writes together.
     pub copy_bytes_per_s: f64,
     /// Photon paths.
     pub photon_paths: u32,
@@ -67,12 +67,12 @@ pub struct ResolutionResult {
     pub methods: Vec<MethodResult>,
 }
 
-/// What the steps besides the gather take, in microseconds: device, CPU.
+/// Times of the steps other than the gather, in microseconds: device, CPU.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct StepTimes {
     /// Finding the visible points.
     pub raytracing_us: [f64; 2],
-    /// Tracing photons, and moving them together.
+    /// Tracing photons and joining the regions of lanes.
     pub photon_tracing_us: [f64; 2],
     /// Making the picture.
     pub synthesize_us: [f64; 2],
@@ -89,17 +89,17 @@ pub struct MethodResult {
     pub build_us: f64,
     /// Gathering.
     pub gather_us: f64,
-    /// Part of the visible points that were gathered for; the gather's time is scaled up from it.
+    /// Share of the visible points that were processed; the gather's time is scaled up.
     pub share: f64,
     /// Photons tested for a visible point, on average.
     pub tested: f64,
     /// Photons accepted by a visible point, on average.
     pub accepted: f64,
-    /// Photons tested in a second of gathering.
+    /// Photons tested per second of gathering.
     pub tests_per_s: f64,
-    /// Bytes of photons, visible points and sums that invocations load and store in a second of gathering.
+    /// Bytes of photons, visible points and sums that invocations load and store per second of gathering.
     pub bytes_per_s: f64,
-    /// What the method built.
+    /// The structures that the method built.
     pub structure: Structure,
 }
 
@@ -110,7 +110,7 @@ impl MethodResult {
     }
 }
 
-/// Visible points, photons and what each point accepts of them.
+/// Visible points, photons, and the accepted photons of each point.
 struct Input {
     points: Vec<VisiblePoint>,
     /// R² of each slot, for each photon map.
@@ -131,10 +131,10 @@ impl Input {
 }
 
 impl GatherBench<'_> {
-    /// Runs the bench; `note` hears what it is doing.
+    /// Runs the bench; `note` gets progress messages.
     ///
     /// # Errors
-    /// Whatever a render can meet, and a method that finds other photons than a kd-tree on the CPU does.
+    /// Errors of a render, and a method whose photons differ from those of a k-d tree on the CPU.
     pub fn run(&self, note: &dyn Fn(&str)) -> Result<Results> {
         let mut resolutions = Vec::new();
         let mut copy_bytes_per_s = f64::NAN;
@@ -316,7 +316,7 @@ struct Measured {
 }
 
 impl Measured {
-    /// Compares what the method finds with what is expected, and chooses the share to measure it on.
+    /// Compares the method's photons with the expected ones, and chooses the share for the measurement.
     fn new(renderer: &mut Renderer, method: usize, input: &Input, visible_points: usize) -> Result<Self> {
         let mut measured = Self {
             method,
@@ -351,7 +351,7 @@ impl Measured {
         measured.structure = structure(renderer, METHODS[method].name, &status)?;
         let gathered: Vec<Gathered> = renderer.gpu().download(BufferId::GatheredOf, None)?;
         let tests: Vec<u32> = renderer.gpu().download(BufferId::TestsOf, None)?;
-        // Where cells have a maximum, their method loses photons; its result says how many.
+        // With a maximum per cell, the method loses photons; its result states the number.
         let loses = renderer.sizes().cell_photons.is_some() && METHODS[method].name == "cluster-grid";
         let (mut seen, mut accepted) = (0, 0.0);
         for (slot, point) in input.points.iter().enumerate() {
@@ -374,12 +374,12 @@ impl Measured {
         measured.share = seen as f64 / visible_points.max(1) as f64;
         measured.tested = mean(tests.into_iter().map(|tests| tests & !GATHERED_FOR), seen);
         measured.accepted = accepted / seen.max(1) as f64;
-        // And once as it will be timed.
+        // And once as in the measurement.
         renderer.gather(method, measured.probe)?;
         Ok(measured)
     }
 
-    /// Chooses a stride by what all visible points would take.
+    /// Chooses a stride by the time that all visible points would take.
     fn choose_stride(&mut self, whole_us: f64) {
         self.probe.stride = (whole_us / BUDGET_US).ceil().max(1.0) as u32;
         self.share = 1.0 / f64::from(self.probe.stride);

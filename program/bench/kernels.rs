@@ -1,4 +1,4 @@
-//! What a driver's compiler makes of the kernels: registers, spills, subgroups that fit. No kernel runs.
+//! Statistics of compiled kernels by the driver: registers, spills, subgroups. No kernel runs.
 
 use std::fmt::Write as _;
 
@@ -16,18 +16,18 @@ use ppm_vk::internals::stage::{RAY_QUERY, Shader, StageDesc};
 pub struct CompiledKernels {
     /// Name and driver of the device.
     pub device: String,
-    /// What the kernels know; empty: nothing that a scene can do without.
+    /// Features that are compiled in; empty: none.
     pub features: Vec<String>,
     /// In the order of their names.
     pub kernels: Vec<CompiledKernel>,
 }
 
-/// A kernel, and what the compiler says of it.
+/// A kernel, and its statistics.
 #[derive(Debug, Clone, Serialize)]
 pub struct CompiledKernel {
     /// Its stage.
     pub stage: &'static str,
-    /// Whether it has rays traced by the device itself: stages that trace are there twice where it does.
+    /// Whether it uses ray queries: stages that trace rays are compiled both ways if the device has them.
     pub ray_query: bool,
     /// The driver's figures by its names, in its order.
     pub statistics: Vec<(String, f64)>,
@@ -41,10 +41,10 @@ impl CompiledKernel {
     }
 }
 
-/// Compiles every kernel as a scene with these features needs it: photon paths aimed, a pixel's paths found anew in each iteration.
+/// Compiles every kernel for a scene with these features, with aimed photon paths and the estimator `sppm`.
 ///
 /// # Errors
-/// A device that isn't there, or whose driver doesn't tell what it compiles to.
+/// No such device, or a driver that reports no statistics.
 pub fn compiled_kernels(device: Option<&str>, features: SceneFeatures) -> Result<CompiledKernels> {
     let mut compiler = Compiler::open(device)?;
     let run = clustered_run(compiler.summary().kind);
@@ -76,7 +76,7 @@ pub fn compiled_kernels(device: Option<&str>, features: SceneFeatures) -> Result
     })
 }
 
-/// The figures as a table, a column for each that differs among the kernels, but for hashes.
+/// The figures as a table, with a column for each figure that differs among the kernels, except hashes.
 pub fn kernels_table(compiled: &CompiledKernels) -> String {
     let features = if compiled.features.is_empty() {
         "none".to_owned()

@@ -1,7 +1,7 @@
 //! Benches: the gather methods on one device against each other and against the paper, and error against time.
 //!
-//! All figures of a bench come from one process. Methods take turns, so that what else the machine does meets them all;
-//! times are device timestamps, and of repeated runs the median counts.
+//! All figures of a bench come from one process. Runs of the methods are interleaved, so that other load on the machine affects
+//! all of them; times are device timestamps, and of repeated runs the median counts.
 
 mod converge;
 mod features;
@@ -57,7 +57,7 @@ fn log_slope(points: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
     (logs.len() > 1 && variance > 0.0).then_some(covariance / variance)
 }
 
-/// A slope for people.
+/// A slope as text.
 fn slope_text(slope: Option<f64>) -> String {
     slope.map_or("unknown".to_owned(), |slope| format!("{slope:.2}"))
 }

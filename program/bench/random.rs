@@ -1,4 +1,4 @@
-//! Whether the numbers that paths draw look random: χ² of tuples, within a path and across paths and iterations.
+//! Tests the random numbers of paths: χ² of tuples, within a path and across paths and iterations.
 
 use std::time::Instant;
 
@@ -15,32 +15,32 @@ pub const LIMIT: f64 = 6.0;
 /// Tuples that a task counts.
 const CHUNK: u64 = 1 << 20;
 
-/// What the numbers of a tuple are taken from.
+/// The source of the numbers of a tuple.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Across {
-    /// One path, one after the other: the first four that it draws.
+    /// One path: its first four numbers.
     Numbers,
-    /// Neighbouring paths: the first of each.
+    /// Neighbouring paths: the first number of each.
     Paths,
-    /// One path in successive iterations: the first of each.
+    /// One path in successive iterations: the first number of each.
     Iterations,
 }
 
 /// A test's outcome.
 #[derive(Debug, Clone, Serialize)]
 pub struct ChiSquare {
-    /// Where the numbers come from.
+    /// The generator.
     pub sampler: &'static str,
-    /// What the tuples are taken across.
+    /// The source of the tuples.
     pub across: Across,
     /// Numbers of a tuple.
     pub length: usize,
     /// Tuples counted.
     pub tuples: u64,
-    /// How many standard deviations χ² lies from its mean; the χ² has so many degrees of freedom that it is normal.
+    /// Distance of χ² from its mean in standard deviations; χ² has enough degrees of freedom to be normal.
     pub deviations: f64,
-    /// Whether that is no more than [`LIMIT`].
+    /// Whether that is at most [`LIMIT`].
     pub passes: bool,
 }
 
@@ -53,7 +53,7 @@ pub struct Battery {
     pub tests: Vec<ChiSquare>,
 }
 
-/// Tests the generators that claim to be random on so many numbers each; `note` hears what it is doing.
+/// Tests the independent generators with this number of numbers each; `note` gets progress messages.
 pub fn battery(numbers: u64, seed: u32, note: &dyn Fn(&str)) -> Battery {
     let mut tests = Vec::new();
     for (name, sampler) in [

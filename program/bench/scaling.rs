@@ -1,4 +1,4 @@
-//! How the cost of gathering grows with photons, visible points and radius.
+//! The growth of gathering costs with photons, visible points and radius.
 
 use serde::Serialize;
 
@@ -14,13 +14,13 @@ const PHOTONS: [u32; 7] = [10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_27
 const SIDES: [f64; 5] = [0.5, 1.0, 2.0, 3.5, 5.0];
 /// Factors of the radius.
 const RADII: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
-/// Photon paths up to which more than one iteration is measured.
+/// Maximum number of photon paths for which several iterations are measured.
 const REPEATED: u32 = 400_000;
 
 /// Costs of some methods.
 #[derive(Debug, Clone, Serialize)]
 pub struct Scaling {
-    /// Where.
+    /// The device.
     pub device: DeviceDescription,
     /// One for each method and quantity.
     pub series: Vec<Series>,
@@ -31,7 +31,7 @@ pub struct Scaling {
 pub struct Series {
     /// The method's name.
     pub method: &'static str,
-    /// What is varied.
+    /// The varied quantity.
     pub against: &'static str,
     /// In growing order.
     pub points: Vec<Point>,
@@ -48,11 +48,11 @@ pub struct Point {
     pub cost_us: f64,
 }
 
-/// Measures the cost of those of the bench's methods that look at nearby photons alone, at its first resolution, with the
-/// radius fixed at what is automatic there. Photon paths go up to `most_photons`.
+/// Measures the cost of the methods that test nearby photons only, at the first resolution, with the automatic radius of that
+/// resolution. Photon paths go up to `most_photons`.
 ///
 /// # Errors
-/// Whatever a render can meet.
+/// Errors of a render.
 pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> Result<Scaling> {
     let [width, height] = *bench
         .resolutions
@@ -120,14 +120,14 @@ pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> R
 fn cost_us(bench: &GatherBench, config: RenderConfig) -> Result<f64> {
     let repeats = if config.photons > REPEATED { 1 } else { bench.repeats };
     let mut times = Vec::new();
-    // The first one warms up; each is a render of its own, whose radii haven't shrunk.
+    // The first one is a warm-up; each is a separate render, whose radii have not shrunk.
     for repeat in 0..=repeats {
         if repeat == 0 && repeats == 1 {
             continue;
         }
         let mut session = Session::new(bench.scene, bench.camera, &config, &bench.platform)?;
         let renderer = stages_of(&mut session)?;
-        // So that the photons' buffers fit and the kernels are there.
+        // So that photon buffers are fitted and kernels are compiled.
         renderer.trace()?;
         if let Some(method) = config.gather {
             renderer.trace()?;
@@ -139,7 +139,7 @@ fn cost_us(bench: &GatherBench, config: RenderConfig) -> Result<f64> {
     Ok(median(times.split_off(warm)))
 }
 
-/// Microseconds of an iteration's launches between moving photons together and what comes after gathering.
+/// Microseconds of an iteration's launches after `compact`, up to the end of the gather.
 fn gather_us(run: &Run) -> f64 {
     let mut gathering = false;
     let mut us = 0.0;

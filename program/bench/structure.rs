@@ -1,4 +1,4 @@
-//! What the methods' orders look like: fillers, cluster sizes, photons a cell.
+//! Statistics of the methods' structures: fillers, cluster sizes, photons per cell.
 
 use serde::Serialize;
 
@@ -12,7 +12,7 @@ use ppm_vk::internals::stage::BufferId;
 /// Order statistics of some counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Spread {
-    /// How many counts there are.
+    /// Number of counts.
     pub number: usize,
     /// The smallest.
     pub min: u32,
@@ -37,26 +37,26 @@ impl Spread {
 /// Workgroups of visible points that have one mesh or cluster each.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Clusters {
-    /// Fillers, of all places in the workgroups.
+    /// Share of fillers in the workgroups.
     pub filler_ratio: f64,
-    /// Visible points of a k-means cluster, empty clusters left out; `None` where there are no clusters.
+    /// Visible points per k-means cluster, excluding empty ones; `None` without clusters.
     pub sizes: Option<Spread>,
 }
 
-/// What a method built.
+/// The structures that a method built.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Structure {
-    /// Workgroups of visible points, where the method orders them.
+    /// Workgroups of visible points, if the method orders them.
     pub clusters: Option<Clusters>,
-    /// Photons of a cell, empty ones left out, where the method has a grid.
+    /// Photons per cell, excluding empty ones, if the method has a grid.
     pub cell_photons: Option<Spread>,
-    /// Photons beyond the maximum that the user set for a cell.
+    /// Photons beyond the user's maximum per cell.
     pub lost_photons: u32,
     /// Cells that had more than that maximum.
     pub full_cells: u32,
 }
 
-/// What the method that gathered last has left on the device.
+/// Reads the structures of the last gather from the device.
 pub fn structure(renderer: &mut Renderer, method: &str, status: &StatusCounters) -> Result<Structure> {
     let ordered = method.starts_with("hitpoint-sort") || method.starts_with("cluster") && method != "clustered";
     let cells = match method {
@@ -123,7 +123,7 @@ pub fn cluster_picture(renderer: &mut Renderer) -> Result<Image> {
     Ok(Image::new(width, height, pixels))
 }
 
-/// Colours that tell neighbours apart: hues in steps of the golden ratio.
+/// Distinct colours for neighbours: hues in steps of the golden ratio.
 fn color(index: usize) -> [f32; 3] {
     let hue = (index as f64 * 0.618_033_988_75).fract() * 6.0;
     let channel = |offset: f64| {

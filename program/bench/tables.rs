@@ -1,4 +1,4 @@
-//! A bench's results as text: the paper's tables with its figures beside ours, then all methods.
+//! A bench's results as text: the paper's tables next to our figures, then all methods.
 
 use std::fmt::Write as _;
 
@@ -232,7 +232,7 @@ fn structure(method: &MethodResult) -> String {
     text
 }
 
-/// What the methods are, for the head of a scaling table.
+/// Names of the methods, for the head of a scaling table.
 fn summary(name: &str) -> &'static str {
     METHODS
         .iter()

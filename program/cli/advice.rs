@@ -1,4 +1,4 @@
-//! The library's messages in the words of the command line: the flags that its kinds of errors and warnings speak of.
+//! Messages of the library with the command line's flags, by the kinds of errors and warnings.
 
 use anyhow::{Error, anyhow};
 use ppm_vk::{Failure, LoadChoice, Remark, Remedy, Warning};
@@ -14,7 +14,7 @@ pub fn line(error: &Error) -> String {
     causes.fold(first, |line, cause| format!("{line}: {cause}"))
 }
 
-/// The same of an error of the library.
+/// The same for an error of the library.
 pub fn of_library(error: &ppm_vk::Error) -> String {
     use ppm_vk::Error::{Memory, Setting, Unfit};
     match error {
@@ -45,7 +45,7 @@ fn of_remedy(remedy: Remedy) -> String {
     }
 }
 
-/// What ended a render too early.
+/// The failure that ended a render early.
 pub fn of_failure(failure: &Failure) -> Error {
     let Failure { error, iteration, kept } = failure;
     anyhow!(
@@ -54,7 +54,7 @@ pub fn of_failure(failure: &Failure) -> Error {
     )
 }
 
-/// What a user should know of a scene.
+/// A remark about a scene.
 pub fn of_remark(remark: &Remark) -> String {
     let flag = match remark.choice() {
         Some(LoadChoice::FrameTime) => "--frame-time SECONDS applies them",
@@ -67,7 +67,7 @@ pub fn of_remark(remark: &Remark) -> String {
     format!("{remark} ({flag})")
 }
 
-/// What a picture lacks, and what to do.
+/// A warning about a picture, with advice.
 pub fn of_warning(warning: &Warning) -> String {
     let flag = match warning {
         Warning::KeptChoices => "; use --estimator sppm",

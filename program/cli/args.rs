@@ -1,4 +1,4 @@
-//! The arguments, as cli.md gives them to scripts.
+//! Command line arguments.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -15,7 +15,7 @@ use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
 use ppm_vk::{Accel, Choice, Direct, EmissionChoice, Estimator, RenderConfig, Sampler, TriangleTest};
 
-/// Parts of the picture's larger side that the film is moved by at the most.
+/// Maximum shift of the film, in units of the picture's larger side.
 const FARTHEST_SHIFT: f32 = 1000.0;
 
 /// Progressive photon mapping on Vulkan: a glTF scene in, an OpenEXR picture out.
@@ -33,7 +33,7 @@ pub struct Arguments {
     pub command: Option<Command>,
 }
 
-/// What there is besides rendering.
+/// Commands other than rendering.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// List the Vulkan devices, their limits, and whether the program runs on them.
@@ -49,9 +49,9 @@ pub enum Command {
     Bench(Bench),
     /// Measure error against time.
     Converge(Box<ConvergeArguments>),
-    /// Say how far a picture is from a reference.
+    /// Compare a picture with a reference.
     Compare(Compare),
-    /// Say what a scene holds.
+    /// Show the contents of a scene.
     Inspect {
         /// glTF file (.gltf or .glb).
         scene: PathBuf,
@@ -66,22 +66,22 @@ pub enum Command {
 /// The benches.
 #[derive(Debug, Subcommand)]
 pub enum Bench {
-    /// The gather methods on one device: the paper's tables with its figures beside, then all methods.
+    /// The gather methods on one device: the paper's tables next to our figures, then all methods.
     Gather(Box<BenchGather>),
-    /// How random the numbers are that paths draw: χ² of tuples. Exits with 1 if independent ones aren't.
+    /// χ² tests of random numbers. Exits with 1 if independent numbers fail.
     Random(BenchRandom),
-    /// What each feature costs that a scene doesn't need.
+    /// The cost of features that a scene does not need.
     Features(BenchFeatures),
-    /// What the driver's compiler says of each kernel: registers, spills, subgroups that fit. Nothing is run.
+    /// Statistics of compiled kernels by the driver: registers, spills, subgroups. Nothing is run.
     Kernels(BenchKernels),
 }
 
-/// What computes.
+/// The backend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BackendChoice {
     /// A Vulkan device.
     Vulkan,
-    /// The processor, without Vulkan: a plain renderer in f64, which the kernels are tested against.
+    /// The CPU, without Vulkan: a plain renderer in f64, which the kernels are tested against.
     Cpu,
 }
 
@@ -102,13 +102,13 @@ pub struct RenderArguments {
     /// Exposure of the PNG, in stops.
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
     pub exposure: f32,
-    /// Radius of the camera's lens, in scene units: what isn't in focus is blurred [default: a pinhole].
+    /// Radius of the camera's lens, in scene units, for depth of field [default: a pinhole].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     pub aperture: Option<f64>,
-    /// Distance along the direction of view of what is in focus, in scene units [default: of the scene's centre].
+    /// Focus distance along the direction of view, in scene units [default: that of the scene's centre].
     #[arg(long, value_name = "D", requires = "aperture", allow_negative_numbers = true, value_parser = positive)]
     pub focus: Option<f64>,
-    /// Move the film to the right and up, in parts of the picture's larger side, as Blender's shift does.
+    /// Shift the film to the right and up, as a fraction of the picture's larger side, like Blender's shift.
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = shift)]
     pub shift: Option<[f32; 2]>,
     /// Pixels [default: 1280 wide at the camera's aspect ratio].
@@ -117,25 +117,25 @@ pub struct RenderArguments {
     /// Camera, by name or index [default: the scene's first].
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
-    /// Stop after so many iterations [default: 64 if there is neither --time nor --target-error].
+    /// Stop after this number of iterations [default: 64 without --time and --target-error].
     #[arg(long, value_name = "N", value_parser = count)]
     pub iterations: Option<u32>,
-    /// Stop after so many seconds.
+    /// Stop after this time, in seconds.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
     pub time: Option<Duration>,
-    /// Stop when the estimated relative error (root of relMSE) is no larger than this, from iteration 16 on.
+    /// Stop when the estimated relative error (root of relMSE) is at most this, from iteration 16 on.
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = positive)]
     pub target_error: Option<f64>,
     /// Photon paths emitted in an iteration.
     #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.photons, value_parser = count)]
     pub photons: u32,
-    /// New visible points each iteration, or the same ones all the time as in the paper.
+    /// New visible points in each iteration, or always the same ones as in the paper.
     #[arg(long, default_value_t = RenderConfig::DEFAULT.estimator, value_parser = choice::<Estimator>())]
     pub estimator: Estimator,
     /// Direct light by sampling the lights, or by photons as in the paper.
     #[arg(long, default_value_t = RenderConfig::DEFAULT.direct, value_parser = choice::<Direct>())]
     pub direct: Direct,
-    /// Eq. 2's α: the part of an iteration's photons that a visible point keeps.
+    /// α of equation 2: the share of an iteration's photons that a visible point keeps.
     #[arg(long, value_name = "A", default_value_t = RenderConfig::DEFAULT.alpha, allow_negative_numbers = true, value_parser = alpha)]
     pub alpha: f32,
     /// Initial radius in scene units [default: from the photons' density, printed].
@@ -144,37 +144,37 @@ pub struct RenderArguments {
     /// How visible points find their photons (ppm-vk gathers lists the methods) [default: the fastest].
     #[arg(long, value_name = "METHOD", value_parser = gather_method)]
     pub gather: Option<usize>,
-    /// Photons that a cell of --gather cluster-grid holds at the most, as in the paper: more are lost, and counted
-    /// [default: cells hold all].
+    /// Maximum number of photons per cell of --gather cluster-grid, as in the paper: photons beyond it are lost, and counted
+    /// [default: unlimited].
     #[arg(long, value_name = "N", value_parser = count)]
     pub cell_photons: Option<u32>,
-    /// How rays meet triangles.
+    /// Ray tracing method.
     #[arg(long, default_value_t = RenderConfig::DEFAULT.accel, value_parser = choice::<Accel>())]
     pub accel: Accel,
-    /// How a ray is tested against a triangle: havel is the paper's test with precomputed planes.
+    /// Triangle test: havel is the paper's test with precomputed planes.
     #[arg(long, default_value_t = RenderConfig::DEFAULT.triangle_test, value_parser = choice::<TriangleTest>())]
     pub triangle_test: TriangleTest,
-    /// Bounces of a camera or photon path at the most.
+    /// Maximum number of bounces of a camera or photon path.
     #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.max_depth, value_parser = count)]
     pub max_depth: u32,
-    /// Where photon paths start: learned from what the picture needs, or by the lights' power as in the paper
-    /// [default: aimed, with --estimator ppm power].
+    /// Start of photon paths: learned, where the picture needs photons, or by the lights' power as in the paper [default: aimed,
+    /// with --estimator ppm power].
     #[arg(long, value_parser = choice::<EmissionChoice>())]
     pub emission: Option<EmissionChoice>,
-    /// Where the numbers of paths come from [default: sobol, with --estimator ppm independent].
+    /// Random numbers of paths [default: sobol, with --estimator ppm independent].
     #[arg(long, value_parser = choice::<Sampler>())]
     pub sampler: Option<Sampler>,
-    /// Seed: the same one on the same device gives the same picture, bit for bit (but for the paper's gathers that order
+    /// Seed: the same seed on the same device gives the same picture, bit for bit (except with the paper's gathers that order
     /// photons by atomic counters).
     #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.seed)]
     pub seed: u32,
     /// Vulkan device, by a part of its name or its index [default: the best].
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
-    /// What computes [default: what the gather method runs on].
+    /// Backend [default: that of the gather method].
     #[arg(long, value_enum)]
     pub backend: Option<BackendChoice>,
-    /// After the run, print what each stage took.
+    /// After the run, print the times of each stage.
     #[arg(long)]
     pub profile: bool,
     /// Write the profile as JSON.
@@ -244,7 +244,7 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// A file name that says what the file will be.
+/// A file name whose ending fits the format.
 fn exr_file(name: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(name);
     match path.extension() {

@@ -18,7 +18,7 @@ use super::scene::{SceneArguments, say_remarks};
 use super::{Outcome, print};
 use crate::bench::{self, GatherBench};
 
-/// What is measured where the user names no scene.
+/// The default scene.
 const CORNELL: [(&str, &[u8]); 2] = [
     ("cornell.gltf", include_bytes!("../../scenes/cornell.gltf")),
     ("cornell.bin", include_bytes!("../../scenes/cornell.bin")),
@@ -41,19 +41,19 @@ pub struct BenchGather {
     /// Radius in scene units [default: from the photons' density].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     radius: Option<f64>,
-    /// Methods, separated by commas [default: all; with --scaling those that look at nearby photons alone].
+    /// Methods, separated by commas [default: all; with --scaling those that test nearby photons only].
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = gather_method)]
     methods: Vec<usize>,
-    /// Photons that a cell of cluster-grid holds at the most, as in the paper [default: all].
+    /// Maximum number of photons per cell of cluster-grid, as in the paper [default: unlimited].
     #[arg(long, value_name = "N", value_parser = count)]
     cell_photons: Option<u32>,
-    /// How often each method runs; of its times the median counts.
+    /// Number of runs of each method; the median time counts.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = count)]
     repeats: u32,
     /// Vary photons, visible points and radius instead.
     #[arg(long)]
     scaling: bool,
-    /// With --scaling: photon paths at the most.
+    /// With --scaling: maximum number of photon paths.
     #[arg(long, value_name = "N", default_value_t = 10_000_000, requires = "scaling", value_parser = clap::value_parser!(u32).range(31_623..))]
     most_photons: u32,
     /// Write all figures as JSON.
@@ -109,7 +109,7 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
     let note = |what: &str| {
         say!("bench: {what}");
     };
-    // What took minutes to measure is printed first: nothing that comes after can lose it.
+    // Results that took minutes are printed first, so that a later failure does not lose them.
     let (json, plot): (Vec<u8>, Box<dyn Fn() -> ppm_vk::Result<String>>) = if arguments.scaling {
         let scaling = bench::scaling(&bench, arguments.most_photons, &note)?;
         print(&bench::scaling_table(&scaling))?;
@@ -140,7 +140,7 @@ pub fn gather(arguments: &BenchGather) -> Result<Outcome> {
 /// `ppm-vk bench random`.
 #[derive(Debug, Args)]
 pub struct BenchRandom {
-    /// Numbers that each test draws.
+    /// Numbers per test.
     #[arg(long, value_name = "N", default_value_t = 1_000_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     numbers: u64,
     /// Seed of the numbers.
@@ -192,7 +192,7 @@ pub struct BenchFeatures {
     json: bool,
 }
 
-/// Measures what features cost that a scene doesn't need, prints the table.
+/// Measures the cost of features that a scene does not need, prints the table.
 pub fn features(arguments: &BenchFeatures) -> Result<Outcome> {
     let scene = load(arguments.scene.as_deref(), &arguments.read)?;
     let prepared = PreparedScene::new(&scene)?;
@@ -223,7 +223,7 @@ pub fn features(arguments: &BenchFeatures) -> Result<Outcome> {
 /// `ppm-vk bench kernels`.
 #[derive(Debug, Args)]
 pub struct BenchKernels {
-    /// What is compiled in: none, all, or features by their names in `inspect`, separated by commas.
+    /// Features to compile in: none, all, or names as in `inspect`, separated by commas.
     #[arg(long, value_name = "FEATURES", default_value = "none", value_parser = features_named)]
     features: SceneFeatures,
     /// Vulkan device, by a part of its name or its index [default: the best].
@@ -255,7 +255,7 @@ fn features_named(text: &str) -> Result<SceneFeatures, String> {
     Ok(SceneFeatures::of_constants(known.map(|(_, present)| present)))
 }
 
-/// Compiles the kernels, prints what the driver says.
+/// Compiles the kernels, prints the driver's statistics.
 pub fn kernels(arguments: &BenchKernels) -> Result<Outcome> {
     let compiled = bench::compiled_kernels(arguments.device.as_deref(), arguments.features)?;
     if arguments.json {

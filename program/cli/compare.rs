@@ -17,7 +17,7 @@ use ppm_vk::internals::metrics::{compare, defects, flip, relative_errors};
 pub struct Compare {
     /// OpenEXR picture.
     image: PathBuf,
-    /// OpenEXR picture that it should be.
+    /// Reference, an OpenEXR picture.
     reference: PathBuf,
     /// Print JSON.
     #[arg(long)]
@@ -73,7 +73,7 @@ pub fn run(arguments: &Compare) -> Result<Outcome> {
 
 /// Decades of error that the colours span.
 const DECADES: f32 = 5.0;
-/// None of the others.
+/// Distinct from all other colours.
 const NAN_COLOR: [u8; 3] = [0, 255, 0];
 
 fn write_heatmap(image: &Image, reference: &Image, file: &Path) -> Result<()> {

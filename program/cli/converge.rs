@@ -23,13 +23,13 @@ pub struct ConvergeArguments {
     scene: PathBuf,
     #[command(flatten)]
     read: SceneArguments,
-    /// OpenEXR picture that it should become; its size is rendered.
+    /// Reference, an OpenEXR picture; its size is rendered.
     #[arg(long, value_name = "FILE")]
     reference: PathBuf,
     /// Seconds of rendering, for each setting.
     #[arg(long, value_name = "SECONDS", default_value = "30", allow_negative_numbers = true, value_parser = seconds)]
     time: std::time::Duration,
-    /// What differs between the curves; without it there is one, of the defaults.
+    /// Settings to compare; without it there is one curve, of the defaults.
     #[arg(long, value_enum)]
     vary: Option<Vary>,
     /// Photon paths emitted in an iteration.
@@ -52,16 +52,16 @@ pub struct ConvergeArguments {
     device: Option<String>,
 }
 
-/// What differs between curves.
+/// Settings that are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Vary {
     /// The defaults, and the paper's setting: ppm, direct light by photons.
     Paper,
-    /// Gather methods that look at nearby photons alone.
+    /// Gather methods that test nearby photons only.
     Gather,
     /// α of 0.5, 2/3, 0.8, 0.95.
     Alpha,
-    /// A tenth of, as many, and ten times as many photon paths an iteration.
+    /// A tenth, the same number, and ten times as many photon paths per iteration.
     Photons,
     /// sppm and ppm.
     Estimator,
@@ -161,7 +161,7 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
     };
     interrupt::install()?;
     let mut table = String::new();
-    // What is measured next is written anew: a file that can't be doesn't end it.
+    // Later measurements write the file again, so a failure does not end the run.
     let mut written = Ok(());
     converge(&what, &note, &mut |convergence| {
         table = converge_table(convergence);

@@ -1,5 +1,5 @@
-//! Signals that ask to stop (Ctrl-C, SIGTERM, SIGHUP): the first one asks the render to end and to write its picture, one more
-//! ends the process at once, unless it is writing.
+//! Signals that ask to stop (Ctrl-C, SIGTERM, SIGHUP): the first one ends the render and writes its picture, a second one ends
+//! the process at once, unless it is writing.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -9,24 +9,24 @@ use anyhow::{Context, Result};
 
 use ppm_vk::internals::files;
 
-/// Signals that follow the one before within this time are the same request: `timeout` sends to the process and then to its group,
-/// and a key that is held repeats.
+/// Signals within this time after the previous one are the same request: `timeout` signals the process and then its group, and a
+/// held key repeats.
 const ONE_REQUEST: Duration = Duration::from_secs(1);
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// Tells requests from repeats of the last one.
+/// Distinguishes requests from repeats of the last one.
 #[derive(Debug)]
 struct Requests(Option<Instant>);
 
-/// What a signal asks for.
+/// The request of a signal.
 #[derive(Debug, PartialEq, Eq)]
 enum Request {
-    /// To stop.
+    /// Stop.
     Stop,
-    /// The same that was asked for before.
+    /// A repeat of the previous request.
     Repeat,
-    /// To end at once.
+    /// End at once.
     End,
 }
 
@@ -56,7 +56,7 @@ fn on_signal(end: impl FnOnce()) {
     }
 }
 
-/// Installs the handler, for the signals that the process isn't told to ignore (`nohup`, jobs in the background).
+/// Installs the handler, for the signals that the process does not have to ignore (`nohup`, background jobs).
 #[cfg(unix)]
 pub fn install() -> Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -66,20 +66,20 @@ pub fn install() -> Result<()> {
     let mut signals = signal_hook::iterator::Signals::new(signals).context("no handler for Ctrl-C")?;
     std::thread::spawn(move || {
         for _ in signals.forever() {
-            // Nothing is torn down: the device's threads are still at work.
+            // No destructors run: the device's threads are still active.
             on_signal(|| signal_hook::low_level::exit(130));
         }
     });
     Ok(())
 }
 
-/// The same where there are no signals.
+/// The same for systems without signals.
 #[cfg(not(unix))]
 pub fn install() -> Result<()> {
     ctrlc::set_handler(|| on_signal(|| std::process::exit(130))).context("no handler for Ctrl-C")
 }
 
-/// Whether a signal was ignored when the program started. Linux tells; elsewhere SIGHUP is taken to be, so that `nohup` works.
+/// Whether a signal was ignored when the program started. Known on Linux; elsewhere assumed for SIGHUP, so that `nohup` works.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let Ok(status) = std::fs::read_to_string("/proc/self/status") else {
@@ -90,7 +90,7 @@ fn is_ignored(signal: i32) -> bool {
     ignored.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// Has writing past a limit of file sizes fail with an error, as on a full disk, instead of killing the process.
+/// Makes writes beyond a limit of file sizes fail with an error, as on a full disk, instead of killing the process.
 pub fn survive_file_limits() -> Result<()> {
     #[cfg(unix)]
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default())

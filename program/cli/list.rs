@@ -192,8 +192,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     Ok(text)
 }
 
-/// What a render of the first camera takes on the best device with the settings that it has where the user gives none;
-/// `None` where there is no device.
+/// The memory of a render of the first camera on the best device with default settings; `None` without a device.
 fn memory(scene: &Scene, prepared: &PreparedScene) -> Option<(Memory, RenderConfig)> {
     let config = RenderConfig::of(&scene.cameras[0]);
     let device = best_device().ok()?;

@@ -1,4 +1,4 @@
-//! The command line: arguments to settings, and one function a command.
+//! The command line: arguments to settings, and one function per command.
 
 /// Prints a line to stderr; a stderr that can't be written to is no error.
 macro_rules! say {
@@ -30,19 +30,19 @@ use clap::Parser;
 use args::{Arguments, Command};
 use ppm_vk::internals::text;
 
-/// How a command ended; the process's exit code.
+/// The outcome of a command; the process's exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Done: 0.
     Done,
-    /// Interrupted, with what was done so far written: 130.
+    /// Interrupted, with results so far written: 130.
     Interrupted,
 }
 
-/// Parses the process's arguments and does what they ask for. Wrong arguments end the process with exit code 2.
+/// Parses the process's arguments and runs the command. Wrong arguments end the process with exit code 2.
 ///
 /// # Errors
-/// The work failed; the error's text is one line.
+/// A failed command; the error's text is one line.
 pub fn run() -> Result<Outcome> {
     interrupt::survive_file_limits()?;
     let arguments = Arguments::try_parse().unwrap_or_else(|error| refuse(&error));
@@ -60,7 +60,7 @@ pub fn run() -> Result<Outcome> {
     }
 }
 
-/// Ends the process as clap does, but with what a terminal would obey in arguments spelt out.
+/// Ends the process as clap does, but with control characters in arguments escaped.
 fn refuse(error: &clap::Error) -> ! {
     let text = error.render().to_string();
     let plain = text::escaped_lines(&text);
@@ -71,7 +71,7 @@ fn refuse(error: &clap::Error) -> ! {
     std::process::exit(error.exit_code());
 }
 
-/// Prints to stdout; a reader that has seen enough (`| head`) is no error.
+/// Prints to stdout; a reader that closes the pipe (`| head`) is no error.
 fn print(text: &str) -> Result<Outcome> {
     match std::io::stdout().lock().write_all(text::escaped_lines(text).as_bytes()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),

@@ -8,13 +8,13 @@ use anyhow::{Result, bail, ensure};
 use super::advice;
 use ppm_vk::internals::files::check_writable;
 
-/// What a path names: files are one file if any of these is the same.
+/// The identities of a path: two paths are the same file if any of these is equal.
 struct Place {
     /// The entry in its folder, which writing replaces.
     entry: PathBuf,
-    /// What it is a link to.
+    /// The target of a link.
     file: Option<PathBuf>,
-    /// The file system's number of it, which all its names have in common.
+    /// The file system's number, common to all its hard links.
     number: Option<(u64, u64)>,
 }
 
@@ -44,7 +44,7 @@ impl Place {
     }
 }
 
-/// Where file systems take capitals for small letters as a rule, so does a comparison.
+/// On systems whose file systems usually ignore case, the comparison does too.
 fn as_compared(path: PathBuf) -> PathBuf {
     if cfg!(any(windows, target_os = "macos")) {
         path.to_string_lossy().to_lowercase().into()
@@ -82,7 +82,7 @@ pub fn check_outputs<'a>(inputs: &[&Path], outputs: impl Iterator<Item = &'a Pat
     outputs.into_iter().try_for_each(|output| Ok(check_writable(output)?))
 }
 
-/// Fails if any of these has, with all that failed in one line: what can't be written doesn't stop the others.
+/// Fails if any of these failed, with all failures in one line: one failed output does not stop the others.
 pub fn all(written: impl IntoIterator<Item = Result<()>>) -> Result<()> {
     let failures = written.into_iter().filter_map(Result::err);
     let failures: Vec<String> = failures.map(|error| advice::line(&error)).collect();
@@ -90,12 +90,12 @@ pub fn all(written: impl IntoIterator<Item = Result<()>>) -> Result<()> {
     Ok(())
 }
 
-/// Formats that the end of a name may say.
+/// Formats by file name endings.
 const ENDINGS: [&str; 12] = [
     "exr", "hdr", "png", "jpg", "jpeg", "webp", "svg", "json", "csv", "gltf", "glb", "bin",
 ];
 
-/// A parser of names of files of one format: those that say another one are refused.
+/// A parser of file names for one format: names with the ending of another format are refused.
 pub fn named(format: &'static str) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
     move |name| {
         let path = PathBuf::from(name);
@@ -136,7 +136,7 @@ mod tests {
             ("a.exr", "link"),
             ("link", "d/hard"),
             ("a.exr", "d/../a.exr"),
-            // Files that aren't there yet.
+            // Files that do not exist yet.
             ("b.exr", "d/../b.exr"),
             ("d/c.exr", "link-to-d/c.exr"),
             ("./b.exr", "b.exr"),

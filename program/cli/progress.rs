@@ -1,4 +1,4 @@
-//! The progress bar: iterations, photons a second, time left; and a sign of life where there is nothing to count.
+//! The progress bar: iterations, photons per second, remaining time; and a spinner for other work.
 
 use std::io::IsTerminal;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use ppm_vk::{Progress, Until};
 
-/// A bar on stderr; nothing where stderr is no terminal.
+/// A bar on stderr; nothing if stderr is no terminal.
 pub struct Bar {
     bar: ProgressBar,
     until: Until,
@@ -37,7 +37,7 @@ impl Bar {
         }
     }
 
-    /// Shows where the render is.
+    /// Shows the progress of the render.
     pub fn show(&self, progress: Progress) {
         let Progress {
             iterations,
@@ -57,7 +57,7 @@ impl Bar {
         ));
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
@@ -67,11 +67,11 @@ impl Bar {
 pub const READING: &str = "reading the scene";
 pub const BUILDING: &str = "building the hierarchy of its triangles";
 
-/// Work that takes longer than this shows that it goes on.
+/// Work that takes longer than this shows a spinner.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Does `work`, and shows for how long it has been at it once that is more than a second: neither a file's reader nor the
-/// hierarchy's builder tells how far it is.
+/// Does `work`, and shows the elapsed time once it is more than a second: neither a file's reader nor the hierarchy's builder
+/// reports progress.
 pub fn while_showing<T>(text: &'static str, quiet: bool, work: impl FnOnce() -> T) -> T {
     if quiet || !std::io::stderr().is_terminal() {
         return work();

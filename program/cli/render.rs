@@ -21,7 +21,7 @@ use super::progress::{BUILDING, Bar, while_showing, with_prefix};
 use super::scene::say_remarks;
 use super::{Outcome, advice, interrupt};
 
-/// Iterations where the user gives neither them nor a time.
+/// Default number of iterations, without a time limit.
 const DEFAULT_ITERATIONS: u32 = 64;
 
 /// The render command.
@@ -29,7 +29,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let path = arguments.scene.as_deref().context("--scene is missing")?;
     let (platform, gather) = choose_platform(arguments);
     let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
-    // Before any work: nobody wants to learn after an hour that the picture can't be written.
+    // Before any work: fail early if a picture can't be written.
     check_outputs(&arguments.read.inputs(path), outputs(arguments, &output))?;
     interrupt::install()?;
 
@@ -86,10 +86,10 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     })
 }
 
-/// Writes all that was asked for, whatever becomes of the others, and says what was rendered.
+/// Writes all outputs, even if some of them fail, and reports the render.
 ///
 /// # Errors
-/// All that failed, the render itself among it, in one line.
+/// All failures, including that of the render, in one line.
 fn write_outputs(arguments: &RenderArguments, output: &Path, rendered: &Rendered) -> Result<()> {
     let _writing = Writing::begin();
     let picture = rendered.write_exr(output);
@@ -147,7 +147,7 @@ fn write_json(file: &Path, value: &serde_json::Value) -> Result<()> {
     Ok(film::write_whole(file, &serde_json::to_vec_pretty(value)?)?)
 }
 
-/// What computes, and the gather method: each follows the other where the user names one alone.
+/// Backend and gather method: if the user names one of them, the other follows.
 fn choose_platform(arguments: &RenderArguments) -> (Platform, usize) {
     let of_method = |method: usize| match METHODS[method].runs {
         Runs::Device { .. } => BackendChoice::Vulkan,

@@ -1,4 +1,4 @@
-//! What the commands that read a scene have in common.
+//! Common parts of the commands that read a scene.
 
 use std::path::{Path, PathBuf};
 
@@ -11,14 +11,14 @@ use super::progress::{READING, while_showing};
 use ppm_vk::internals::loader::MEMORY_LIMIT;
 use ppm_vk::{Environment, LightUnits, LoadOptions, Scene};
 
-/// How a scene's file is read.
+/// Arguments for reading a scene.
 #[derive(Debug, Args)]
 pub struct SceneArguments {
-    /// Light from all around the scene: an equirectangular picture (.hdr or .exr) or one radiance (R,G,B) [default: none, or
-    /// 1,1,1 for a scene without any light].
+    /// Environment lighting: an equirectangular picture (.hdr or .exr) or one radiance (R,G,B) [default: none, or 1,1,1 for a
+    /// scene without any light].
     #[arg(long, value_name = "FILE|R,G,B", value_parser = environment)]
     environment: Option<EnvironmentChoice>,
-    /// Turn the environment about +Y, which takes +Z towards +X. 90 puts a picture where Blender's world has it.
+    /// Rotate the environment about +Y, from +Z towards +X. 90 matches Blender's world.
     #[arg(
         long,
         value_name = "DEG",
@@ -36,36 +36,36 @@ pub struct SceneArguments {
         value_parser = positive
     )]
     environment_strength: f64,
-    /// Units of points, spots and suns (KHR_lights_punctual): as the specification has them; 683 times as large as Blender's
-    /// exporter writes them unless told «Unitless»; or by the exporter that the file names.
+    /// Units of points, spots and suns (KHR_lights_punctual): those of the specification; 683 times as large, as Blender's
+    /// exporter writes them except with «Unitless»; or by the exporter that the file names.
     #[arg(long, default_value_t, value_parser = choice::<LightUnits>())]
     light_units: LightUnits,
-    /// Take closed meshes of glass without a volume (KHR_materials_transmission alone, as Blender exports glass) as solid
-    /// [default: thin walls, as glTF has it].
+    /// Treat closed meshes of glass without a volume (only KHR_materials_transmission, as Blender exports glass) as solid
+    /// [default: thin walls, as in glTF].
     #[arg(long)]
     solid_glass: bool,
-    /// Diameter of directional lights as seen from here, in degrees: shadows have soft edges, and mirrors show a disc.
+    /// Angular diameter of directional lights, in degrees: shadows have soft edges, and mirrors show a disc.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, value_parser = sun_angle)]
     sun_angle: f64,
-    /// Radius of points and spots, in scene units: they shine, and are seen, as balls.
+    /// Radius of points and spots, in scene units: they emit, and look, like balls.
     #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = light_radius)]
     light_radius: f64,
     /// Apply the scene's animations at this time, in seconds [default: everything at rest].
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     frame_time: Option<f64>,
-    /// Memory that the scene may take as it is read, in all: buffers, geometry, images, environment. A small file can ask for any
-    /// amount [default: 2].
+    /// Maximum memory of the scene while it is read: buffers, geometry, images, environment. A small file can request any amount
+    /// [default: 2].
     #[arg(long, value_name = "GIB", allow_negative_numbers = true, value_parser = positive)]
     memory_limit: Option<f64>,
     /// Materials of this variant (ppm-vk inspect lists a scene's) [default: each mesh's own].
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
-    /// Scene of a file that has several [default: the file's default scene, or the first that shows a mesh].
+    /// Scene of a file that has several [default: the file's default scene, or the first one with a mesh].
     #[arg(long, value_name = "NAME|INDEX")]
     scene_name: Option<String>,
 }
 
-/// What `--environment` asks for.
+/// The value of `--environment`.
 #[derive(Debug, Clone, PartialEq)]
 enum EnvironmentChoice {
     /// One radiance, linear RGB.
@@ -75,7 +75,7 @@ enum EnvironmentChoice {
 }
 
 impl SceneArguments {
-    /// The files that are read, with the scene's.
+    /// The files that are read, including the scene.
     pub fn inputs<'a>(&'a self, scene: &'a Path) -> Vec<&'a Path> {
         let mut inputs = vec![scene];
         if let Some(EnvironmentChoice::Picture(picture)) = &self.environment {
@@ -110,7 +110,7 @@ impl SceneArguments {
         Ok(scene)
     }
 
-    /// Scales and rotates what surrounds the scene, whether it was asked for or is there because nothing else shines.
+    /// Scales and rotates the environment, also the default one of a scene without lights.
     fn place_environment(&self, scene: &mut Scene) -> Result<()> {
         let is_asked = [self.environment_rotation != 0.0, self.environment_strength != 1.0];
         if let Some(environment) = scene.environment.take() {
@@ -138,7 +138,7 @@ impl SceneArguments {
     }
 }
 
-/// Says what a user should know of a scene.
+/// Prints the notes and warnings of a scene.
 pub fn say_remarks(scene: &Scene) {
     for note in &scene.notes {
         say!("note: {}", advice::of_remark(note));
@@ -148,7 +148,7 @@ pub fn say_remarks(scene: &Scene) {
     }
 }
 
-/// Three numbers, or else the name of a file.
+/// Three numbers, or otherwise the name of a file.
 fn environment(text: &str) -> Result<EnvironmentChoice, String> {
     let numbers: Option<Vec<f32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     let Some(Ok(radiance)) = numbers.map(<[f32; 3]>::try_from) else {

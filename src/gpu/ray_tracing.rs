@@ -379,7 +379,7 @@ impl Device {
 
 pub(super) fn no_ray_query(device: &str) -> Error {
     Error::Device(format!(
-        "device {device} traces no rays by itself (VK_KHR_ray_query); use --accel bvh, or pick another with --device"
+        "device {device} has no ray queries (VK_KHR_ray_query); use bvh or another device"
     ))
 }
 

@@ -39,7 +39,7 @@ pub fn accels() -> Vec<Accel> {
         accels.push(Accel::RayQuery);
     } else {
         println!(
-            "ray queries skipped: {} traces no rays by itself (VK_KHR_ray_query)",
+            "ray queries skipped: {} has no ray queries (VK_KHR_ray_query)",
             device.name
         );
     }
