@@ -62,7 +62,7 @@ impl std::fmt::Display for RelativeError {
             [self.total, self.noise, self.bias, self.aliasing].map(|part| format!("{:.2} %", 100.0 * part));
         write!(text, "relative error about {total} (noise {noise}, bias {bias}")?;
         if self.aliasing > 0.0 {
-            write!(text, ", centres of pixels alone {aliasing}")?;
+            write!(text, ", aliasing {aliasing}")?;
         }
         if self.missing > NOTABLE * self.total {
             let missing = 100.0 * self.missing;

@@ -130,7 +130,7 @@ impl Profile {
         let wall_us = us(self.wall());
         let [width, height] = subject.resolution;
         let mut text = format!(
-            "{} at {width}x{height}, {} photon paths an iteration, gather {}\non {} ({}), timestamps of {} ns\n\n",
+            "{} at {width}x{height}, {} photon paths per iteration, gather {}\non {} ({}), timestamps of {} ns\n\n",
             escaped(&subject.scene),
             subject.photons,
             subject.gather,

@@ -262,8 +262,8 @@ fn refusals_say_what_a_number_must_be() {
         (&["--time=nan"][..], "must be above 0 and finite"),
         (&["--target-error=inf"], "must be above 0 and finite"),
         (&["--time=1e300"], "more than can be counted"),
-        (&["--aperture=1e20"], "a lens has a radius of"),
-        (&["--aperture=0.1", "--focus=1e-300"], "too wide to see anything by"),
+        (&["--aperture=1e20"], "the maximum radius of a lens is"),
+        (&["--aperture=0.1", "--focus=1e-300"], "is too wide for that"),
     ] {
         let output = ppm_vk(folder.path(), &[&["--scene", scene], arguments].concat());
         let text = stderr(&output);

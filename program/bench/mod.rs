@@ -29,7 +29,7 @@ use ppm_vk::{Error, Result, Session};
 
 /// The stages of a session, one by one.
 fn stages_of(session: &mut Session) -> Result<&mut Renderer> {
-    let on_cpu = || Error::Config("stages are measured on a Vulkan device alone".to_owned());
+    let on_cpu = || Error::Config("stages are measured on Vulkan devices only".to_owned());
     session.on_device().ok_or_else(on_cpu)
 }
 

@@ -66,8 +66,7 @@ pub fn scaling(bench: &GatherBench, most_photons: u32, note: &dyn Fn(&str)) -> R
     let methods: Vec<usize> = bench.methods.iter().copied().filter(near).collect();
     if methods.is_empty() {
         return Err(Error::Config(
-            "--scaling: none of these --methods looks at nearby photons alone; try clustered or cluster-grid"
-                .to_owned(),
+            "--scaling: none of these --methods tests nearby photons only; try clustered or cluster-grid".to_owned(),
         ));
     }
     let mut series = Vec::new();

@@ -189,7 +189,8 @@ fn methods(result: &ResolutionResult, copy_bytes_per_s: f64) -> String {
             shares.join(", ")
         );
     }
-    text += "order: visible points, when they are new; build: photons; b + g: build and gather; clearing buffers isn't timed. GB/s: what invocations load and\n\
+    text += "order: visible points, when they are new; build: photons; b + g: build and gather; clearing buffers is not \
+             timed. GB/s: what invocations load and\n\
              store; caches serve part of it, so that it can exceed what a copy moves.\n";
     for method in &result.methods {
         text += &structure(method);

@@ -171,7 +171,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
         let ([width, height], photons) = (config.resolution, config.photons);
         let caustic_map = if memory.caustic_map > 0 {
             let a_pixel = memory.caustic_map / (u64::from(width) * u64::from(height));
-            format!(", {a_pixel} bytes a pixel of it for a map of caustic photons")
+            format!(", of which {a_pixel} bytes per pixel for a map of caustic photons")
         } else {
             String::new()
         };

@@ -57,7 +57,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         say!("initial radius {:.6} scene units (automatic)", session.radius());
     }
     if config.emission == EmissionChoice::Aimed && !session.is_aimed() {
-        say!("photon paths start in proportion to the lights' power: aiming them isn't worth its cost in this scene");
+        say!("photon paths start in proportion to the lights' power: aiming does not pay for its cost in this scene");
     }
 
     let until = Until {
@@ -136,8 +136,7 @@ fn say_rendered(output: &Path, rendered: &Rendered) {
     );
     if let Some(error) = error.filter(|error| error.waiting > 0.0) {
         say!(
-            "{:.2} % of the pixels have had no photon yet: of indirect light there the error says only what one photon would \
-             bring",
+            "{:.2} % of the pixels have received no photon yet: for indirect light there, the error assumes one photon",
             100.0 * error.waiting
         );
     }
@@ -159,9 +158,9 @@ fn choose_platform(arguments: &RenderArguments) -> (Platform, usize) {
         (_, None) => (BackendChoice::Vulkan, gather::default_method()),
     };
     let conflict = if backend != of_method(method) {
-        Some("this --gather doesn't run on this --backend; leave one of them out")
+        Some("this --gather does not run on this --backend; leave one of them out")
     } else if arguments.cell_photons.is_some() && METHODS[method].name != "cluster-grid" {
-        Some("--cell-photons is of --gather cluster-grid")
+        Some("--cell-photons needs --gather cluster-grid")
     } else if arguments.aperture.is_some() && arguments.estimator == Estimator::Ppm {
         Some("--estimator ppm finds visible points once: it has no --aperture")
     } else if arguments.emission == Some(EmissionChoice::Aimed) && arguments.estimator == Estimator::Ppm {

@@ -126,7 +126,7 @@ impl SceneArguments {
                 .map(|(flag, _)| flag)
                 .collect();
             let note = format!(
-                "{} without effect: nothing surrounds the scene (--environment FILE or R,G,B)",
+                "{} without effect: there is no environment (--environment FILE or R,G,B)",
                 match flags[..] {
                     [one] => format!("{one} is"),
                     _ => format!("{} are", flags.join(" and ")),

@@ -152,7 +152,7 @@ pub const METHODS: &[GatherMethod] = &[
     },
     GatherMethod {
         name: "clustered",
-        summary: "runs of neighbouring visible points share what they load from rows of a hashed grid",
+        summary: "runs of neighbouring visible points share photons that they load from rows of a hashed grid",
         paper: "beyond the paper",
         runs: device(points::by_slot, clustered::hashed_grid, Tests::Near, |sizes| {
             sizes.clustered_run

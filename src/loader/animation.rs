@@ -59,7 +59,7 @@ impl<'a> Pose<'a> {
         }
         if !contested.is_empty() {
             warnings.push(format!(
-                "several animations move the same; the last one's value is used for {}",
+                "several animations set the same property; the last one is used for {}",
                 list(&contested)
             ));
         }
@@ -95,7 +95,7 @@ impl<'a> Pose<'a> {
             damaged(format_args!("there is no node {index}, the file has {nodes}"))
         })?;
         let Checked::Valid(property) = channel.target.path else {
-            return Err(damaged("its path is none of translation, rotation, scale and weights"));
+            return Err(damaged("its path is not translation, rotation, scale or weights"));
         };
         if node.matrix.is_some() && property != Property::MorphTargetWeights {
             warnings.push(format!(

@@ -96,7 +96,7 @@ impl<'a, const N: usize> Curve<'a, N> {
         formats: &Formats,
     ) -> Check<Self> {
         let Checked::Valid(interpolation) = sampler.interpolation else {
-            return Err(damaged("its interpolation is none of LINEAR, STEP and CUBICSPLINE"));
+            return Err(damaged("its interpolation is not LINEAR, STEP or CUBICSPLINE"));
         };
         let outputs = Vectors::open(document, sampler.output, formats).map_err(|what| format!("output, {what}"))?;
         let parts = if interpolation == Interpolation::CubicSpline {

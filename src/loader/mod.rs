@@ -179,7 +179,7 @@ fn load(path: &Path, options: LoadOptions, budget: Budget) -> Check<Scene> {
         } else {
             "it has no camera"
         };
-        warnings.push(format!("{of_scene}; one that is framed on its bounds is used"));
+        warnings.push(format!("{of_scene}; a camera framed on its bounds is used"));
         scene.cameras.push(framed_on(scene.bounds()));
     }
     if scene.environment.is_none() && scene.lights.is_empty() && !scene.has_emissive_triangles() {
@@ -211,7 +211,7 @@ fn warn_of_ignored(document: &Document, options: &LoadOptions, warnings: &mut Wa
     if !root.animations.is_empty() && options.frame_time.is_none() {
         warnings.add(Remark::with(
             LoadChoice::FrameTime,
-            "its animations need a time; everything is rendered as it stands at rest",
+            "its animations need a time; everything is rendered at rest",
         ));
     }
 }

@@ -164,7 +164,7 @@ impl TextureReader<'_> {
                     self.images.insert(source, None);
                     let instead = match named.get(place + 1) {
                         Some(fallback) => format!("image {fallback} stands for it"),
-                        None => "its textures are left out, and materials have their factors alone".to_owned(),
+                        None => "its textures are left out, and materials have only their factors".to_owned(),
                     };
                     let label = label("image", source, image.name.as_deref());
                     warnings.push(format!("{label}: {what}; {instead}"));

@@ -47,8 +47,8 @@ use crate::scene::{
 /// Sources of light of which each is asked by a ray of its own; of more one is chosen.
 const ASKED_ALL: usize = 4;
 
-const COARSE_LIGHTS: &str = "textures of lamps have more texels than lights are kept for: the picture is right, but where single \
-                             texels shine, light is chosen by areas of several texels, and is noisier";
+const COARSE_LIGHTS: &str = "textures of lamps have too many texels for a light each: the picture is correct, but if single \
+                             texels emit, light is sampled by areas of several texels, which is noisier";
 
 /// What the ray stages read, in the order of the BVH's leaves.
 #[derive(Debug, Clone)]

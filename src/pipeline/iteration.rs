@@ -103,10 +103,7 @@ impl Renderer {
             self.make_room(&status)?;
         }
         Err(Error::unfit(
-            format!(
-                "device {} cuts loops however small their parts",
-                self.device.summary().name
-            ),
+            format!("device {} cuts even short loops", self.device.summary().name),
             Remedy::AnotherDevice,
         ))
     }

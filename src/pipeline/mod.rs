@@ -84,7 +84,7 @@ impl Renderer {
         config.check()?;
         let method = &METHODS[config.gather.unwrap_or_else(default_method)];
         if method.stages().is_none() {
-            let what = format!("{}: runs on the CPU alone", method.name);
+            let what = format!("{}: runs on the CPU only", method.name);
             return Err(Error::setting(Setting::Gather, what));
         }
         let config = RenderConfig {

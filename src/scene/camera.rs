@@ -130,14 +130,14 @@ impl Scene {
         });
         if radius * scale > LARGEST_LENS {
             let what = format!(
-                "{radius:e}: all would be blurred to nothing; a lens has a radius of {:.3} scene units at the most here",
+                "{radius:e}: everything would be blurred; the maximum radius of a lens is {:.3} scene units here",
                 LARGEST_LENS / scale
             );
             return Err(Error::setting(Setting::Aperture, what));
         }
         if focus > 0.0 && radius * scale > WIDEST_LENS * f64::from(focus) {
             let what = format!(
-                "{:e}: for that a lens of radius {radius:e} is too wide to see anything by; make it smaller, or move the focus away",
+                "{:e}: a lens of radius {radius:e} is too wide for that; make it smaller, or focus farther away",
                 f64::from(focus) / scale
             );
             return Err(Error::setting(Setting::Focus, what));
@@ -150,7 +150,7 @@ impl Scene {
         } else {
             Err(Error::setting(
                 Setting::Focus,
-                "on the scene's centre: that lies behind the camera; say what is in focus",
+                "on the scene's centre, which lies behind the camera; give a focus distance",
             ))
         }
     }

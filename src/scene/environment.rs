@@ -71,7 +71,7 @@ impl Environment {
         let values = || image.pixels().iter().flatten();
         let is_bad = |value: f32| !(value.is_finite() && value >= 0.0);
         if !values().any(|&value| value > 0.0 && value.is_finite()) {
-            return Err("is black, so that no light comes from it; choose another one".into());
+            return Err("is black and emits no light; choose another one".into());
         }
         let replaced = values().filter(|value| is_bad(**value)).count();
         let size = [image.width(), image.height()];
@@ -130,7 +130,7 @@ impl Environment {
         if let Some([width, height]) = self.reduced_from {
             let [to_width, to_height] = self.size();
             warnings.push(format!(
-                "the environment of {width}x{height} pixels is larger than what devices hold, and is reduced to \
+                "the environment of {width}x{height} pixels is larger than devices support, and is reduced to \
                  {to_width}x{to_height}: its light stays, but it is seen less sharp"
             ));
         }
@@ -208,7 +208,7 @@ fn check_size(path: &Path, pixels: u64, memory_limit: u64) -> Result<()> {
     Err(Error::Memory {
         path: path.to_owned(),
         what: format!(
-            "has {pixels} pixels, for which {} of memory are needed, more than the {} that a scene may take",
+            "has {pixels} pixels, which need {} of memory; the limit of a scene is {}",
             bytes(needed),
             bytes(memory_limit)
         ),

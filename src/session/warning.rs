@@ -104,12 +104,12 @@ impl fmt::Display for Warning {
     fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::KeptChoices => text.write_str(
-                "the estimator ppm finds visible points once: where a wavelength, alpha, a coat, a part of the light or a place on a \
-                 lamp is chosen by chance, each pixel keeps its first choice, and the picture stays grainy there, however long it \
-                 renders",
+                "the estimator ppm finds visible points once: where a wavelength, alpha, a coat, a lobe or a point of a lamp \
+                 is chosen at random, each pixel keeps its first choice, and the picture remains grainy there",
             ),
             Self::OneMap => text.write_str(
-                "caustics have the radii of other light: at this resolution a photon map of their own is larger than the device binds",
+                "caustics have the radii of other light: at this resolution, the device can't bind a separate map for caustic \
+                 photons",
             ),
             Self::Truncated { paths, max_depth, .. } if self.is_slight() => write!(
                 text,
@@ -122,30 +122,31 @@ impl fmt::Display for Warning {
                 max_depth,
             } => write!(
                 text,
-                "{paths} camera and photon paths reached the limit of {max_depth} bounces, {} of {emitted} photon paths; about that \
-                 share of the light is missing, more where all is seen by many bounces",
+                "{paths} camera and photon paths reached the limit of {max_depth} bounces, {} of {emitted} photon paths; \
+                 about that share of the light is missing, more in places that are seen by many bounces",
                 percent(share(paths, emitted))
             ),
             Self::Cut { paths, emitted } => write!(
                 text,
-                "{paths} paths were ended by the driver's loop limit, {} of {emitted} photon paths; about that share of the light is \
+                "{paths} paths were ended by the driver's loop limit, {} of {emitted} photon paths; about that share of the \
+                 light is \
                  missing",
                 percent(share(paths, emitted))
             ),
             Self::Lost { photons, stored, cells } => write!(
                 text,
-                "{photons} of {stored} photons, {}, were beyond the maximum of {cells} grid cells; that share of the light that \
-                 photons bring is missing",
+                "{photons} of {stored} photons, {}, were beyond the maximum of {cells} grid cells; that share of the photons' \
+                 light is missing",
                 percent(share(photons, stored))
             ),
             Self::NonFinite { values } => write!(
                 text,
-                "{values} values were NaN or infinite and count as black: a light or a texture of this scene is brighter than numbers \
-                 reach (10^38), or so small that they end"
+                "{values} values were NaN or infinite and count as black: a light or a texture of this scene is out of the \
+                 range of floats (10^38, or too small)"
             ),
             Self::Black => text.write_str(
-                "the picture is black: no light has come to what the camera sees; is there a light that shines there, and nothing \
-                 before the camera?",
+                "the picture is black: no light reaches what the camera sees; check that a light does, and that nothing is in \
+                 front of the camera",
             ),
         }
     }

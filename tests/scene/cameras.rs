@@ -166,7 +166,7 @@ fn a_lens_is_focused_on_the_centre_of_the_scene_or_where_it_is_told() {
         ..camera.clone()
     };
     let error = scene.lens(&turned, 0.1, None).expect_err("an error").to_string();
-    assert!(error.contains("in focus"), "{error}");
+    assert!(error.contains("focus distance"), "{error}");
 }
 
 #[test]

@@ -59,7 +59,12 @@ fn buffers_geometry_images_and_the_environment_are_added_up_to_one_limit() {
         "{two_images}, {three_images}: images aren't added up"
     );
     let limit = ppm_vk::internals::text::bytes(three_images - 1);
-    for words in ["an image of 128x128 texels needs", "beside", &limit, "allow more"] {
+    for words in [
+        "an image of 128x128 texels needs",
+        "in addition to",
+        &limit,
+        "allow more",
+    ] {
         assert!(
             said.contains(words) && !said.contains('\n'),
             "«{words}» isn't in: {said}"

@@ -106,7 +106,7 @@ fn images_that_cannot_be_read_are_told_and_left_out() {
         ),
         (
             json!({"uri": "data:;base64,AAAA"}),
-            ["none of PNG, JPEG, WebP and KTX 2.0", "left out"],
+            ["not PNG, JPEG, WebP or KTX 2.0", "left out"],
         ),
         (json!({}), ["neither a uri nor a bufferView", "left out"]),
         // What the decoder says of a JPEG that is cut short ends with a line end.

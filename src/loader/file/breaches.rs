@@ -38,9 +38,9 @@ pub(crate) fn warn(root: &Value, warnings: &mut Warnings) {
     let kinds = [
         ("lists without elements, ", names(found.empty_lists)),
         ("null, ", names(found.nulls)),
-        ("attributes that it doesn't know, ", names(found.attributes)),
+        ("unknown attributes, ", names(found.attributes)),
         ("accessors without elements, ", list(&found.without_elements)),
-        ("other ways to filter and wrap, ", list(&found.samplers)),
+        ("unknown filters and wrap modes, ", list(&found.samplers)),
     ];
     let kinds = kinds.into_iter().filter(|(_, items)| !items.is_empty());
     let kinds: Vec<String> = kinds.map(|(kind, items)| format!("{kind}{items}")).collect();

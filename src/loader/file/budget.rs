@@ -62,7 +62,7 @@ impl Budget {
             return Ok(());
         }
         let text = format!(
-            "{what} needs {} of memory beside {} of the rest of the scene, which may take {} in all",
+            "{what} needs {} of memory in addition to {} for the rest of the scene, and the limit is {}",
             bytes(size),
             bytes(taken),
             bytes(self.limit)

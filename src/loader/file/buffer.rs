@@ -176,13 +176,13 @@ fn path_of(uri: &str, folder: &Path) -> Check<PathBuf> {
 
 /// The path that a relative URI names from the scene file's folder on.
 fn relative_path(uri: &str) -> Check<PathBuf> {
-    let advice = "put the file beside the scene and refer to it by a relative path";
+    let advice = "put the file next to the scene and refer to it by a relative path";
     if let Some((scheme, _)) = uri.split_once(':')
         && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
         && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
     {
         return Err(format!(
-            "its uri {} has the scheme {}, which isn't followed; {advice}",
+            "its uri {} has the scheme {}, which is not supported; {advice}",
             quote(uri),
             quote(scheme)
         ));

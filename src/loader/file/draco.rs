@@ -59,7 +59,7 @@ pub(crate) fn decompress(document: &mut Document, warnings: &mut Warnings) -> Ch
             match decoded {
                 Ok(decoded) => replace(document, [mesh, primitive], decoded),
                 Err(what) if has_plain_data => warnings.push(format!(
-                    "{}: {what}; the picture is right all the same, by the uncompressed data beside it",
+                    "{}: {what}; the picture is correct, by the file's uncompressed data",
                     label()
                 )),
                 Err(what) => return Err(format!("{}: {what}", label())),

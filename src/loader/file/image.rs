@@ -68,7 +68,7 @@ impl Pixels {
         }
         let unreadable =
             |error: String| format!("it can't be decoded ({error}); export it as PNG, JPEG, WebP or KTX 2.0");
-        let raster = Raster::open(bytes).ok_or("it is none of PNG, JPEG, WebP and KTX 2.0; convert it")?;
+        let raster = Raster::open(bytes).ok_or("it is not PNG, JPEG, WebP or KTX 2.0; convert it")?;
         let [width, height] = raster.size().map_err(unreadable)?;
         let texels = take([width, height], budget)?;
         let memory = (MEMORY_A_TEXEL * texels).saturating_add(1 << 20);
@@ -76,7 +76,7 @@ impl Pixels {
             .rgba(usize::try_from(memory).unwrap_or(usize::MAX))
             .map_err(unreadable)?;
         if rgba.len() as u64 != texels {
-            return Err(unreadable("it has fewer pixels than it says".to_owned()));
+            return Err(unreadable("it has fewer pixels than its header says".to_owned()));
         }
         Ok(Self { width, height, rgba })
     }

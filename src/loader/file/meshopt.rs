@@ -68,7 +68,7 @@ pub(crate) fn decode_views(root: &Root, buffers: &[Vec<u8>], budget: &Budget) ->
         let bytes = Compressed::deserialize(extension)
             .map_err(|error| damaged(error.to_string()))
             .and_then(|compressed| {
-                budget.take(compressed.check(view)?, "what it stands for")?;
+                budget.take(compressed.check(view)?, "its decompressed data")?;
                 compressed.decode(buffers)
             });
         let bytes = bytes.map_err(|what| {
@@ -95,7 +95,7 @@ impl Compressed {
         };
         if !fits {
             return Err(damaged(format_args!(
-                "a stride of {stride} bytes doesn't go with its mode and filter"
+                "a stride of {stride} bytes does not fit its mode and filter"
             )));
         }
         if self.mode == Mode::Triangles && !count.is_multiple_of(3) {
@@ -109,7 +109,7 @@ impl Compressed {
             ))),
             // Before they are allocated.
             Some(bytes) if bytes / MAX_RATIO > self.byte_length => Err(damaged(format_args!(
-                "{} bytes can't stand for {bytes}",
+                "{} bytes can't expand to {bytes}",
                 self.byte_length
             ))),
             Some(bytes) => Ok(bytes),

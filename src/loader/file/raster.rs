@@ -102,7 +102,7 @@ impl<'a> Raster<'a> {
             ColorType::GrayscaleAlpha => 2,
             ColorType::Rgb => 3,
             ColorType::Rgba => 4,
-            ColorType::Indexed => return Err("a palette that is none".to_owned()),
+            ColorType::Indexed => return Err("an invalid palette".to_owned()),
         };
         Ok(expand(&samples, channels))
     }

@@ -53,7 +53,7 @@ pub(crate) fn instances<'a>(
         let at_node = |what| format!("{}: {what}", node_label(&document.root, placed.index));
         let places = if placed.node.skin.is_some() && instancing::extension(placed).is_some() {
             warnings.push(at_node(format!(
-                "it has a skin, which puts its mesh in one place; its {} is ignored",
+                "it has a skin, which determines the position of its mesh; its {} is ignored",
                 MESH_INSTANCING
             )));
             vec![placed.to_world]
@@ -92,7 +92,7 @@ pub(crate) fn instances<'a>(
             if placed.node.skin.is_some() && !attributes.is_skinned() {
                 let label = primitive_label(mesh_index, mesh, primitive_index);
                 warnings.push(format!(
-                    "{label}: it has no joints and weights to follow a skin by; it follows its node, and may be misplaced"
+                    "{label}: it has no joints and weights for its skin; it follows its node, and may be misplaced"
                 ));
             }
             let targets = attributes.morph_target_count();
@@ -152,7 +152,7 @@ pub(crate) fn assemble(
     }
     builder.complete_attributes();
     let geometry = builder.geometry;
-    document.budget.take(geometry.bytes(), "what its meshes show")?;
+    document.budget.take(geometry.bytes(), "the geometry of its meshes")?;
     // Shared triangles may remain that no object uses.
     if geometry.objects.is_empty() {
         return Err(

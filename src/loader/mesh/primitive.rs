@@ -57,11 +57,12 @@ impl<'a> Primitive<'a> {
             Checked::Valid(Mode::TriangleFan) => Topology::Fan,
             Checked::Valid(mode) => {
                 warnings.push(format!(
-                    "{label}: its {mode:?} are skipped and missing in the picture: only triangles are rendered; make tubes or spheres of them"
+                    "{label}: its {mode:?} are skipped and missing in the picture: only triangles are rendered; convert them \
+                     to tubes or spheres"
                 ));
                 return Ok(None);
             }
-            Checked::Invalid => return Err(damaged("its mode is none of 0 to 6")),
+            Checked::Invalid => return Err(damaged("its mode is not one of 0 to 6")),
         };
         let Some(attributes) = Attributes::open(document, primitive)? else {
             warnings.push(format!(

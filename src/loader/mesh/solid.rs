@@ -24,7 +24,7 @@ pub(crate) fn thin_glass(materials: &[Material], used: &[bool]) -> Vec<usize> {
 pub(crate) fn note(root: &Root, thin: &[usize]) -> Option<Remark> {
     (!thin.is_empty()).then(|| {
         let what = format!(
-            "glass without a volume is a thin wall, which doesn't bend light: {}",
+            "glass without a volume is a thin wall, which does not bend light: {}",
             list(&labels(root, thin))
         );
         Remark::with(LoadChoice::SolidGlass, what)
