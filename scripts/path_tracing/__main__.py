@@ -37,7 +37,7 @@ def main():
 
 
 def lost_light(meshes, lights, is_light_tracing):
-    """What no path from the camera finds: light without extent by way of what is smooth."""
+    """Light that no camera path finds: delta lights by way of smooth surfaces."""
     specular = sorted({mesh.material.name for mesh in meshes if mesh.material.is_specular()})
     if not lights or not specular:
         return []

@@ -14,7 +14,7 @@ import numpy as np
 
 
 class Unsupported(Exception):
-    """What the file needs that isn't here, or what is damaged in it: one line."""
+    """A missing feature that the file needs, or a damage in it, in one line."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Material:
         return self.is_clear() and not self.is_thin
 
     def hides_back(self):
-        """Whether cameras look through its back. Glass is seen from both sides."""
+        """Whether its back is culled for cameras. Glass is visible from both sides."""
         return not self.double_sided and not self.is_clear()
 
     def is_specular(self):
@@ -141,7 +141,7 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
 def load(path):
-    """The meshes, cameras and punctual lights of the file's scene, and notes on what is not as the file has it."""
+    """The meshes, cameras and punctual lights of the file's scene, and notes on deviations from the file."""
     return Reader(Path(path)).read()
 
 
@@ -375,7 +375,7 @@ class Reader:
         return material
 
     def check(self, material, refuse):
-        """Says what isn't as the file has it."""
+        """Adds a note on a deviation from the file."""
         if material.ior == 0:
             refuse("an index of refraction of 0 isn't supported")
         if not material.is_clear():

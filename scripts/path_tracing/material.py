@@ -20,7 +20,7 @@ Values = namedtuple("Values", "base metallic alpha f0 f90 transmission opacity")
 
 
 class Look:
-    """What a mesh's material is at its places: textures, and the corners' colours."""
+    """A mesh's material at its points: textures, and vertex colours."""
 
     all = []
 
@@ -67,7 +67,7 @@ class Look:
         return self.material.alpha_mode != "OPAQUE"
 
     def texture(self, slot, si, active, channels=3):
-        """Of a texture, or 1."""
+        """The value of a texture, or 1."""
         if slot not in self.textures:
             return mi.Color3f(1) if channels == 3 else mi.Float(1)
         texture = self.material.textures["base_color" if slot == "alpha" else slot]
@@ -112,7 +112,7 @@ class Look:
         return Values(base, metallic, alpha, dr.minimum(of_ior * color, 1) * specular, specular, transmission, opacity)
 
     def normal(self, si, active):
-        """The shading normal in world space, leaning as a texture says."""
+        """The shading normal in world space, with a normal texture."""
         normal = si.sh_frame.n
         if "normal" not in self.textures:
             return normal
@@ -180,7 +180,7 @@ def bsdf(look):
 
 
 def scaled(material, slot, change):
-    """A texture of Mitsuba's own, its texels changed."""
+    """A texture of Mitsuba with changed texels."""
     texture = material.textures[slot]
     original = bitmap(texture, slot)
     pixels = np.array(mi.traverse(original)["data"])
@@ -240,7 +240,7 @@ class Meeting:
         return opaque * mixed + self.clear * of_clear, base, of_clear
 
     def lobes(self, l):
-        """BSDF times cosine of a direction in the frame, what is smooth left out."""
+        """BSDF times cosine of a direction in the frame, without delta lobes."""
         v, values = self.v, self.values
         is_above = l.z > 0
         up = dr.select(is_above, l, mirrored(l))
@@ -261,7 +261,7 @@ class Meeting:
         return dr.select(v.z > 0, dr.select(is_above, reflected, transmitted), 0)
 
     def probabilities(self):
-        """Of reflecting at the boundary, of scattering in the base, of passing."""
+        """Probabilities of reflection at the boundary, scattering in the base, transmission."""
         reflectance, base, of_clear = self.fresnel(self.v.z)
         reflects = dr.max(reflectance)
         scatters = base * dr.max(self.values.base)
@@ -282,12 +282,12 @@ class Meeting:
         return dr.select(self.v.z > 0, density, 0)
 
     def leaves(self, l):
-        """Whether a direction is on the same side of the surface itself as of its shading normal."""
+        """Whether a direction is on the same side of the geometric and the shading normal."""
         return dr.dot(self.frame.to_world(l), self.geometric) * l.z > 0
 
 
 class Surface(mi.BSDF):
-    """All of glTF's materials but glass with an inside."""
+    """All of glTF's materials except solid glass."""
 
     def __init__(self, props):
         mi.BSDF.__init__(self, props)

@@ -7,7 +7,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-# Lanes of one pass: enough to keep the cores busy, few enough for a laptop's memory.
+# Samples of one pass: enough to keep the cores busy, few enough for a laptop's memory.
 LANES = 1 << 20
 
 # Russian roulette starts after that many bounces. Nothing else ends a path but darkness and the void.
@@ -51,7 +51,7 @@ class Part:
 
 
 class Paths(Part):
-    """Path tracing, all samples of a pass in neighbouring lanes.
+    """Path tracing, all samples of a pass as neighbouring array elements.
 
     With `without`, the scene whose mirrors and glass are black, primary rays that meet a matte surface go on there:
     the rest of what they would find is `Caustics`.
@@ -118,8 +118,8 @@ def primary_rays(scene, pixels, samples, offsets):
     """`samples` neighbouring rays for each pixel, through `offsets` from 0 to 1 within it."""
     sensor = scene.sensors()[0]
     width, height = sensor.film().size()
-    lane = dr.arange(mi.UInt32, samples * len(pixels))
-    pixel = dr.gather(mi.UInt32, mi.UInt32(pixels.astype(np.uint32)), lane // samples)
+    index = dr.arange(mi.UInt32, samples * len(pixels))
+    pixel = dr.gather(mi.UInt32, mi.UInt32(pixels.astype(np.uint32)), index // samples)
     corner = mi.Point2f(pixel % width, pixel // width)
     position = (corner + offsets) / mi.Point2f(width, height)
     ray, _ = sensor.sample_ray_differential(0, 0, position, mi.Point2f(0.5))

@@ -46,11 +46,11 @@ class Lamp(mi.Emitter):
         return cosine != 0 if self.double_sided else cosine > 0
 
     def radiance(self, si, active=True):
-        """What a place emits: all of it, as a path that meets it can also pass it."""
+        """The emission of a point without opacity, because a path that hits it can also pass it."""
         return self.look.emission(si, active)
 
     def share(self, ps, active=True):
-        """The part of a place on a lamp that is there, and the place for its textures."""
+        """The opacity at a point of a lamp, and the texture coordinates there."""
         si = mi.SurfaceInteraction3f(ps, [])
         return self.look.opacity(si, active), si
 
@@ -112,7 +112,7 @@ class Lamp(mi.Emitter):
 
 class Punctual(mi.Emitter):
     """A point light or a spot as KHR_lights_punctual recommends: a spot's intensity falls off with the square of a ramp in
-    the cosine, and a range ends all light. Mitsuba's own falls off otherwise, and has no range."""
+    the cosine, and a range ends all light. Mitsuba's light has another falloff, and no range."""
 
     def __init__(self, props):
         mi.Emitter.__init__(self, props)
@@ -176,7 +176,7 @@ BLACK = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type":
 
 
 def build(meshes, camera, lights, environment, resolution, has_specular=True, is_traced_from_lights=False):
-    """The scene, and whether a path has to look for what absorbs light or is there in part.
+    """The scene, and whether paths have to handle absorption or partial opacity.
 
     Without `has_specular` mirrors and glass are black, so that no light is left that has met any. Where rays are traced
     from lights, half of them go where mirrors and glass are.
