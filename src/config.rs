@@ -213,7 +213,7 @@ impl RenderConfig {
         self.drop_unwanted && self.estimator == Estimator::Sppm
     }
 
-    /// First iteration of the block of `iteration`. With each block the photons' [`SEQUENCES`] begin anew, because the emission
+    /// First iteration of the block of `iteration`. With each block the photons' [`SEQUENCES`] restart, because the emission
     /// table may change then. Blocks grow with the render, up to half of it.
     pub fn block_of(&self, iteration: u32) -> u32 {
         let octave = if iteration < 2 * SEQUENCES {
@@ -226,7 +226,7 @@ impl RenderConfig {
         octave.max(iteration / most * most)
     }
 
-    /// Whether photons' sequences begin anew with an iteration, so that the emission table may change.
+    /// Whether photons' sequences restart with an iteration, so that the emission table may change.
     pub fn begins_sequences(&self, iteration: u32) -> bool {
         iteration - self.block_of(iteration) < if iteration < 2 * SEQUENCES { SEQUENCES } else { 1 }
     }

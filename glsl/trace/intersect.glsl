@@ -12,7 +12,7 @@ uniform usamplerBuffer Bvh;
 uniform usamplerBuffer HavelTriangles;
 
 // Loop iterations of this invocation. Some drivers silently end every loop of an invocation after 65,535 of them: the stages stop
-// earlier and count what they cut short.
+// earlier and count the paths that they cut short.
 uint loop_count = 0u;
 bool loops_cut = false; // a traversal of this invocation was ended early
 

@@ -303,7 +303,7 @@ fn dispatch(
     let device = &context.device;
     let compute = vk::PipelineBindPoint::COMPUTE;
     context.begin_label(commands, stage.shader.name);
-    // SAFETY: the command buffer is recording; the caller keeps what it is given until the work has been waited for.
+    // SAFETY: the command buffer is recording; the caller keeps the resources until the work has finished.
     unsafe {
         device.cmd_bind_pipeline(commands, compute, pipeline.handle);
         device.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, sets, &[]);

@@ -60,7 +60,7 @@ impl Compiler {
     pub fn statistics(&mut self, stage: &StageDesc) -> Result<Vec<(String, f64)>> {
         let pipeline = self.pipelines.get(&self.context, stage)?;
         let executable = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline.handle);
-        // SAFETY: the pipeline is alive, and was created to be asked for its statistics.
+        // SAFETY: the pipeline is alive, and was created with statistics enabled.
         let found = unsafe { self.properties.get_pipeline_executable_statistics(&executable) }
             .or_vulkan("vkGetPipelineExecutableStatisticsKHR")?;
         let statistic = |found: &vk::PipelineExecutableStatisticKHR<'_>| {

@@ -20,7 +20,7 @@ const MOST_ASKED: u64 = 1 << 22;
 const ASKED_A_TEXEL: f64 = 4.0;
 const ASKED_A_PART: u32 = 2;
 /// Parts are not divided further if their squared noise is at most this multiple of that of even emission, for an object whose
-/// triangles all emit alike.
+/// triangles all emit equally.
 const EVEN_ENOUGH: f64 = 1.1;
 /// The share of a part's weight that goes by the brightest texels that it may read: no point of a part as small as a texel emits
 /// more than 50 times its weight.

@@ -42,7 +42,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// The emission table changes only when sequences begin anew, so that learning changes no sequence.
+    /// The emission table changes only when sequences restart, so that learning changes no sequence.
     pub(super) fn begin_block(&mut self, iteration: u32) -> Result<()> {
         if self.aim.is_none() || !self.config.begins_sequences(iteration) {
             return Ok(());

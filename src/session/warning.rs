@@ -19,32 +19,32 @@ pub enum Warning {
     OneMap,
     /// Paths reached [`RenderConfig::max_depth`].
     Truncated {
-        /// How many.
+        /// Their number.
         paths: u64,
-        /// Of so many photon paths.
+        /// Total number of photon paths.
         emitted: u64,
         /// The limit.
         max_depth: u32,
     },
     /// Paths that the driver's loop limit ended.
     Cut {
-        /// How many.
+        /// Their number.
         paths: u64,
-        /// Of so many photon paths.
+        /// Total number of photon paths.
         emitted: u64,
     },
     /// Photons beyond [`RenderConfig::cell_photons`].
     Lost {
-        /// How many.
+        /// Their number.
         photons: u64,
-        /// Of so many.
+        /// Number of stored photons.
         stored: u64,
-        /// In so many cells.
+        /// Number of full cells.
         cells: u64,
     },
     /// Values that were NaN or infinite.
     NonFinite {
-        /// How many.
+        /// Their number.
         values: u64,
     },
     /// No light at all.
