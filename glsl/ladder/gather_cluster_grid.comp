@@ -79,7 +79,7 @@ void main() {
     }
     // Loops that did not reach their end were cut by the driver: the gather is repeated in smaller parts.
     if (tested != to_test || rows != (high.y - low.y + 1u) * (high.z - low.z + 1u)) {
-        atomicOr(status.again, GATHERS_TOO_LONG);
+        atomicOr(status.retry, GATHERS_TOO_LONG);
     }
     add_gathered(slot, push.map, sum, tested);
 }

@@ -46,7 +46,7 @@ bool shows_delta_lights(Material material) {
 
 // Random numbers of their own: the path's numbers do not depend on whether a light is sampled.
 float delta_light_number(Random random, uint i) {
-    return number_of(random, uvec2(i, GLINT));
+    return number_of(random, uvec2(i, DELTA_LIGHT_NUMBERS));
 }
 
 vec2 delta_light_place(Random random) {

@@ -68,7 +68,7 @@ void load_transmitted(inout Branch branch) {
 
 void main() {
     uint pixel_slot = invocation_index();
-    if (pixel_slot >= pixel_slots() || status.again != 0u) {
+    if (pixel_slot >= pixel_slots() || status.retry != 0u) {
         return;
     }
     uvec2 pixel = pixel_of(pixel_slot);

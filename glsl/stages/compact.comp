@@ -22,7 +22,7 @@ void main() {
         photon_count = min(scan_total, settings.photon_capacity);
         atomicMax(status.batch_need, scan_total);
         if (scan_total > settings.photon_capacity) {
-            atomicOr(status.again, PHOTONS_DID_NOT_FIT);
+            atomicOr(status.retry, PHOTONS_DID_NOT_FIT);
         }
         uint before = status.photons_stored_low;
         status.photons_stored_low = before + scan_total;

@@ -138,7 +138,7 @@ bool has_caustic_photons(uint slot) {
 
 void main() {
     uint receiver = invocation_index();
-    if (receiver >= receiver_count() || status.again != 0u) {
+    if (receiver >= receiver_count() || status.retry != 0u) {
         return;
     }
     uint slot = receiver % slots();

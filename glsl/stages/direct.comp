@@ -145,7 +145,7 @@ void add_direct(VisiblePoint visible_point, uint slot, uint of_source, bool asks
 
 void main() {
     uint slot = invocation_index();
-    if (slot >= slots() || status.again != 0u) {
+    if (slot >= slots() || status.retry != 0u) {
         return;
     }
     VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);

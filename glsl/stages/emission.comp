@@ -16,7 +16,7 @@ layout(std430) writeonly buffer PathStarts { PathStart path_starts[]; };
 
 void main() {
     uint path = invocation_index();
-    if (path >= push.path_count || status.again != 0u) {
+    if (path >= push.path_count || status.retry != 0u) {
         return;
     }
     Random random = random_of_path(path);

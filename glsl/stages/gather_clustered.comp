@@ -154,7 +154,7 @@ void main() {
     // Loops that did not reach their end were cut by the driver: the gather is repeated in smaller parts.
     if (tested != to_test || rows_done != rows || points_done != points ||
         shells_done != shells_wanted) {
-        atomicOr(status.again, GATHERS_TOO_LONG);
+        atomicOr(status.retry, GATHERS_TOO_LONG);
     }
     for (uint k = 0u; k < RUN; k++) {
         if (receivers[k].object != NO_OBJECT) {

@@ -203,7 +203,7 @@ void main() {
         atomicAdd(status.photons_landed_high, 1u);
     }
     if (stored > settings.lane_capacity) {
-        atomicOr(status.again, PHOTONS_DID_NOT_FIT);
+        atomicOr(status.retry, PHOTONS_DID_NOT_FIT);
     }
     if (!finished) {
         // The driver or the limit cut the loop. Fewer paths per lane may help.
@@ -211,7 +211,7 @@ void main() {
         uint left = next < push.path_count ? (push.path_count - 1u - next) / settings.photon_lanes + 1u : 0u;
         atomicAdd(status.cut_paths, begun + left);
         if (push.path_count > settings.photon_lanes) {
-            atomicOr(status.again, LANES_TOO_LONG);
+            atomicOr(status.retry, LANES_TOO_LONG);
         }
     }
     if (truncated > 0u) {

@@ -46,7 +46,7 @@ vec4 update_map(uint receiver, vec3 weight) {
 
 void main() {
     uint slot = invocation_index();
-    if (slot >= slots() || status.again != 0u) {
+    if (slot >= slots() || status.retry != 0u) {
         return;
     }
     VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);

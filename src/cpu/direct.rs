@@ -17,7 +17,8 @@ use super::vector::{mean, rgb};
 use super::{FAR, Inputs};
 use crate::emission::light_of;
 use crate::layout::{
-    DIELECTRIC, DIRECT_CROSSINGS, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, GLINT, LightSource, NO_LIGHT, TRIANGLE_LIGHT,
+    DELTA_LIGHT_NUMBERS, DIELECTRIC, DIRECT_CROSSINGS, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, LightSource, NO_LIGHT,
+    TRIANGLE_LIGHT,
 };
 use crate::random::Random;
 
@@ -113,7 +114,7 @@ pub fn narrow_reflection_of_lights(
     viewer: DVec3,
     random: &Random,
 ) -> DVec3 {
-    let place = DVec2::from([0, 1].map(|number| random.number_of([number, GLINT])));
+    let place = DVec2::from([0, 1].map(|number| random.number_of([number, DELTA_LIGHT_NUMBERS])));
     let mut sum = DVec3::ZERO;
     for light in inputs.scene.lights.iter().filter(|light| is_punctual(light)) {
         let origin = met

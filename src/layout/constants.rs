@@ -140,11 +140,11 @@ shared_constants! {
     /// Wrap: goes back and forth.
     pub const MIRROR_REPEAT: u32 = 2;
 
-    /// Bit of [`super::StatusCounters::again`]: a lane's photons or a batch's didn't fit.
+    /// Bit of [`super::StatusCounters::retry`]: a lane's photons or a batch's didn't fit.
     pub const PHOTONS_DID_NOT_FIT: u32 = 1;
-    /// Bit of [`super::StatusCounters::again`]: a lane's paths need more loop iterations than the driver gives.
+    /// Bit of [`super::StatusCounters::retry`]: a lane's paths need more loop iterations than the driver gives.
     pub const LANES_TOO_LONG: u32 = 2;
-    /// Bit of [`super::StatusCounters::again`]: a visible point has more photons to test than loop iterations.
+    /// Bit of [`super::StatusCounters::retry`]: a visible point has more photons to test than loop iterations.
     pub const GATHERS_TOO_LONG: u32 = 4;
 
     /// [`super::Material::surface`] of a Lambertian reflector.
@@ -205,8 +205,8 @@ shared_constants! {
     pub const LIGHT_SAMPLE: u32 = 0x6c69_6768;
     /// Likewise.
     pub const COVERAGE_SAMPLE: u32 = 0x636f_7665;
-    /// Of a path's numbers that belong to a glint; no instance has that index.
-    pub const GLINT: u32 = 0x676c_696e;
+    /// Second word of the random numbers that belong to delta lights; no instance has that index.
+    pub const DELTA_LIGHT_NUMBERS: u32 = 0x676c_696e;
 
     /// Parts of a triangle's coordinates by which rays leave it.
     pub const ROUNDINGS: f64 = 16.0 / 16_777_216.0;

@@ -214,8 +214,8 @@ device_structs! {
         pub cut_paths: u32,
         /// Values that were NaN or infinite and were left out.
         pub non_finite: u32,
-        /// Why the iteration has to be done again, bits; see [`PHOTONS_DID_NOT_FIT`] and the next two.
-        pub again: u32,
+        /// Retry reasons of the iteration, bits; see [`PHOTONS_DID_NOT_FIT`] and the next two.
+        pub retry: u32,
         /// Photons stored, low word.
         pub photons_stored_low: u32,
         /// High word.

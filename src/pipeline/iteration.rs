@@ -90,7 +90,7 @@ impl Renderer {
         let mut all = Run::default();
         for _ in 0..REPEATS {
             let status = work(self, &mut all)?;
-            if status.again == 0 {
+            if status.retry == 0 {
                 let [of_lane, of_batch] = self.photon_need;
                 self.photon_need = [of_lane.max(status.lane_need), of_batch.max(status.batch_need)];
                 return Ok((all, status));
@@ -111,16 +111,16 @@ impl Renderer {
     /// Before an iteration is repeated: sets the sizes that it needs and clears what it gathered.
     fn make_room(&mut self, status: &StatusCounters) -> Result<()> {
         // With more lanes, the number of photons per lane is estimated again.
-        if status.again & LANES_TOO_LONG != 0 {
+        if status.retry & LANES_TOO_LONG != 0 {
             self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
-        } else if status.again & PHOTONS_DID_NOT_FIT != 0 {
+        } else if status.retry & PHOTONS_DID_NOT_FIT != 0 {
             self.sizes.grow(status.lane_need, status.batch_need);
         }
-        if status.again & (LANES_TOO_LONG | PHOTONS_DID_NOT_FIT) != 0 {
+        if status.retry & (LANES_TOO_LONG | PHOTONS_DID_NOT_FIT) != 0 {
             self.sizes.shrink_batch(&self.limits);
             self.upload_settings()?;
         }
-        if status.again & GATHERS_TOO_LONG != 0 {
+        if status.retry & GATHERS_TOO_LONG != 0 {
             self.sizes.gather_parts = self.sizes.gather_parts.saturating_mul(2);
         }
         self.forget_gathered()
@@ -178,7 +178,7 @@ impl Renderer {
         let Some(begun) = self.ahead.take() else { return Ok(()) };
         let iteration = self.totals.iterations;
         let ended = self.end_of(begun, &mut Run::default())?;
-        if ended.status.again == 0 {
+        if ended.status.retry == 0 {
             self.take_in(iteration, &ended.status, &ended.values, ended.added);
             return Ok(());
         }
@@ -276,7 +276,7 @@ impl Renderer {
                 all,
             )?;
             recording = Recording::new();
-            if ended.status.again != 0 {
+            if ended.status.retry != 0 {
                 return Ok(ended);
             }
             if stop() {
