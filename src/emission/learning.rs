@@ -208,7 +208,7 @@ impl Aim {
             let values = trace(aim.table(), iteration)?;
             aim.learn(config, iteration, 0, &values);
         }
-        let is_kept = config.aims_anyway || aim.is_worth_it();
+        let is_kept = config.aims_anyway || aim.aiming_pays();
         aim.update();
         Ok(is_kept.then_some(aim))
     }
@@ -432,7 +432,7 @@ impl Aim {
 
     /// Whether aiming pays for its cost: compares the squared error of the picture for the same time with that of paths by power.
     /// In a closed room nearly every photon is useful, wherever it starts.
-    pub fn is_worth_it(&self) -> bool {
+    pub fn aiming_pays(&self) -> bool {
         let (mut aimed, mut by_power) = (Worth::default(), Worth::default());
         for cell in self.cells.iter().filter(|cell| cell.counts.paths > 0.0) {
             let counts = &cell.counts;

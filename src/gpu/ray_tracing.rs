@@ -240,7 +240,7 @@ fn boxes(triangles: &[ShadingTriangle], ranges: &BTreeMap<u32, Range<u32>>, inst
     boxes
 }
 
-/// The scale of a distance in render space in the space of an instance, where its triangles lie within about ±1.
+/// Bound of the coordinates that points of render space have in the space of an instance, where its triangles lie within about ±1.
 fn largest_coordinate(rows: &[[f32; 4]; 3]) -> f64 {
     let [x, y, z] = rows.map(|row| row.map(f64::from));
     let linear = DMat3::from_cols_array_2d(&[x, y, z].map(|[a, b, c, _]| [a, b, c])).transpose();

@@ -59,7 +59,7 @@ impl Renderer {
         &mut self,
         record: impl Fn(Stages<'_>) -> Recording,
     ) -> Result<(Run, StatusCounters)> {
-        self.do_until_it_fits(|renderer, all| {
+        self.retry_until_it_fits(|renderer, all| {
             let (run, status) = renderer.run_reporting(record(renderer.stages()))?;
             all.add(run);
             Ok(status)
@@ -83,7 +83,7 @@ impl Renderer {
     }
 
     /// The same for several recordings: `work` adds their time and returns the status.
-    fn do_until_it_fits(
+    fn retry_until_it_fits(
         &mut self,
         mut work: impl FnMut(&mut Self, &mut Run) -> Result<StatusCounters>,
     ) -> Result<(Run, StatusCounters)> {
@@ -100,7 +100,7 @@ impl Renderer {
             if let Some(begun) = self.ahead.take() {
                 all.add(self.device.finish(begun.ticket)?.run);
             }
-            self.make_room(&status)?;
+            self.prepare_retry(&status)?;
         }
         Err(Error::unfit(
             format!("device {} cuts even short loops", self.device.summary().name),
@@ -109,7 +109,7 @@ impl Renderer {
     }
 
     /// Before an iteration is repeated: sets the sizes that it needs and clears what it gathered.
-    fn make_room(&mut self, status: &StatusCounters) -> Result<()> {
+    fn prepare_retry(&mut self, status: &StatusCounters) -> Result<()> {
         // With more lanes, the number of photons per lane is estimated again.
         if status.retry & LANES_TOO_LONG != 0 {
             self.sizes.set_lanes(self.sizes.photon_lanes.saturating_mul(2));
@@ -123,10 +123,10 @@ impl Renderer {
         if status.retry & GATHERS_TOO_LONG != 0 {
             self.sizes.gather_parts = self.sizes.gather_parts.saturating_mul(2);
         }
-        self.forget_gathered()
+        self.clear_gathered()
     }
 
-    pub(super) fn forget_gathered(&mut self) -> Result<()> {
+    pub(super) fn clear_gathered(&mut self) -> Result<()> {
         let mut recording = Recording::new();
         recording.fill(BufferId::GatheredOf, 0);
         self.run(&recording).map(|_| ())
@@ -152,21 +152,21 @@ impl Renderer {
             self.begin_block(iteration)?;
         }
         let (mut added, mut values) = (Totals::default(), Vec::new());
-        let (run, status) = self.do_until_it_fits(|renderer, all| {
+        let (run, status) = self.retry_until_it_fits(|renderer, all| {
             let ended = renderer.attempt(iteration, stop, another, all)?;
             (added, values) = (ended.added, ended.values);
             Ok(ended.status)
         })?;
         self.iteration_ns = run.launches.iter().map(|launch| launch.duration_ns).sum();
         if added.emitted == 0 {
-            return self.forget_gathered().map(|()| None);
+            return self.clear_gathered().map(|()| None);
         }
-        self.take_in(iteration, &status, &values, added);
+        self.count_iteration(iteration, &status, &values, added);
         Ok(Some(run))
     }
 
     /// Adds a completed iteration to the totals.
-    fn take_in(&mut self, iteration: u32, status: &StatusCounters, values: &[u32], added: Totals) {
+    fn count_iteration(&mut self, iteration: u32, status: &StatusCounters, values: &[u32], added: Totals) {
         let before = self.reported.replace(*status).unwrap_or_else(StatusCounters::zeroed);
         count(&mut self.counters, &before, status);
         self.learn(iteration, values);
@@ -174,15 +174,15 @@ impl Renderer {
     }
 
     /// Completes the iteration that was submitted ahead, before anything else uses the device.
-    pub(super) fn settle(&mut self) -> Result<()> {
+    pub(super) fn complete_ahead(&mut self) -> Result<()> {
         let Some(begun) = self.ahead.take() else { return Ok(()) };
         let iteration = self.totals.iterations;
         let ended = self.end_of(begun, &mut Run::default())?;
         if ended.status.retry == 0 {
-            self.take_in(iteration, &ended.status, &ended.values, ended.added);
+            self.count_iteration(iteration, &ended.status, &ended.values, ended.added);
             return Ok(());
         }
-        self.forget_gathered()
+        self.clear_gathered()
     }
 
     /// Attempts an iteration, which may have been submitted ahead.

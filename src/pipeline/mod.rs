@@ -177,7 +177,7 @@ impl Renderer {
     /// # Errors
     /// As [`Backend::resolve`].
     pub fn picture(&mut self) -> Result<(Run, Resolved)> {
-        self.settle()?;
+        self.complete_ahead()?;
         let recording = self.stages().picture(self.totals);
         let (run, status) = self.run_reporting(recording)?;
         self.counters.non_finite += u64::from(status.non_finite);

@@ -131,7 +131,7 @@ pub(crate) fn assemble(
 ) -> Check<Geometry> {
     let root = &document.root;
     let normalisation = normalise(root, instances)?;
-    let mut builder = Builder::new(normalisation, sharing::is_worth_it(root, instances));
+    let mut builder = Builder::new(normalisation, sharing::sharing_pays(root, instances));
     let mut dropped: Vec<(String, usize)> = Vec::new();
     for instance in instances {
         document

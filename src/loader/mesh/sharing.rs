@@ -26,7 +26,7 @@ pub(crate) fn shareable(root: &Root, instance: &MeshInstance<'_>) -> Option<DAff
 }
 
 /// Whether the instances have enough triangles in common for sharing to pay.
-pub(crate) fn is_worth_it(root: &Root, instances: &[MeshInstance<'_>]) -> bool {
+pub(crate) fn sharing_pays(root: &Root, instances: &[MeshInstance<'_>]) -> bool {
     let (mut all, mut saved) = (0, 0);
     let mut known = HashSet::new();
     for instance in instances {
