@@ -2,8 +2,9 @@
 
 use crate::config::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
-    BehindGlass, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, Gloss, GridShape, PathStart, Photon,
-    SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters, TILE, VisiblePoint,
+    BehindGlass, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, GridShape, PathStart, Photon,
+    SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters, TILE, VisibleLobes, VisiblePoint,
+    packed_bsdf_texels,
 };
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
 
@@ -63,8 +64,8 @@ pub struct Sizes {
     pub object_cells: u32,
     /// 2 if caustic photons have a map of their own, otherwise 1.
     pub photon_maps: u32,
-    /// Whether the scene has glossy surfaces.
-    pub glossy: bool,
+    /// Lobes of visible points.
+    pub lobes: VisibleLobes,
     /// Maximum number of photons of such a cell.
     pub cell_photons: Option<u32>,
     /// Whether photon paths are aimed.
@@ -106,8 +107,8 @@ pub struct Limits {
     pub splitting: bool,
     /// Whether it has mirrors or glass.
     pub specular: bool,
-    /// Whether it has glossy surfaces.
-    pub glossy: bool,
+    /// Of its visible points.
+    pub lobes: VisibleLobes,
     /// The scene's objects.
     pub meshes: u32,
     /// Cells of all objects' grids.
@@ -156,7 +157,7 @@ impl Sizes {
                 Estimator::Sppm if limits.specular && two_maps <= limits.storage_buffer_bytes => 2,
                 _ => 1,
             },
-            glossy: limits.glossy,
+            lobes: limits.lobes,
             aimed: config.emission == EmissionChoice::Aimed,
             cell_photons: config.cell_photons,
             probe: Probe::default(),
@@ -227,7 +228,7 @@ impl Sizes {
         let scan_blocks = scanned.map(|count| count.div_ceil(u64::from(SCAN_BLOCK)));
         let (count, size) = match id {
             BufferId::VisiblePoints => (slots, size_of::<VisiblePoint>()),
-            BufferId::GlossOf => (if self.glossy { slots } else { 1 }, size_of::<Gloss>()),
+            BufferId::PackedBsdfs => ((slots * packed_bsdf_texels(self.lobes)).max(1), 16),
             BufferId::EmissionTable if self.aimed => (1, EMISSION_TABLE_BYTES),
             BufferId::EmissionTable => (1, 16),
             BufferId::PathStarts => (u64::from(self.batch_paths), size_of::<PathStart>()),
@@ -336,7 +337,7 @@ mod tests {
                 clustered_run: 1,
                 splitting: false,
                 specular: false,
-                glossy: false,
+                lobes: VisibleLobes::default(),
                 meshes: 5,
                 object_cells: 500,
             };

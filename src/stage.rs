@@ -43,8 +43,8 @@ pub enum BufferId {
     PathValues,
     /// [`crate::layout::VisiblePoint`]s in slot order.
     VisiblePoints,
-    /// [`crate::layout::Gloss`] of each slot, where the scene has glossy surfaces.
-    GlossOf,
+    /// [`crate::layout::PackedBsdf`] of each slot, where the scene has glossy surfaces.
+    PackedBsdfs,
     /// [`crate::layout::Statistics`] of each slot, for each photon map.
     StatisticsOf,
     /// [`crate::layout::Gathered`] of each slot, for each photon map.

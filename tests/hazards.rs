@@ -3,6 +3,7 @@
 
 use ppm_vk::internals::config::RenderConfig;
 use ppm_vk::internals::gather::METHODS;
+use ppm_vk::internals::layout::VISIBLE_LOBES;
 use ppm_vk::internals::packing::SceneFeatures;
 use ppm_vk::internals::pipeline::Stages;
 use ppm_vk::internals::record::{Command, Recording};
@@ -53,7 +54,7 @@ fn iterations(photons: u32, storage_buffer_bytes: u64) -> Vec<(String, Recording
             clustered_run: 8,
             lanes: 4096,
             splitting: true,
-            glossy: true,
+            lobes: [true; VISIBLE_LOBES.len()],
             meshes: 9,
             object_cells: 9 * 1024,
         };

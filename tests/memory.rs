@@ -11,6 +11,7 @@ mod picture;
 use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::{Estimator, RenderConfig, Totals};
 use ppm_vk::internals::gpu::best_device;
+use ppm_vk::internals::layout::VISIBLE_LOBES;
 use ppm_vk::internals::packing::SceneFeatures;
 use ppm_vk::internals::pipeline::{Memory, Stages};
 use ppm_vk::internals::sizes::{Limits, Sizes};
@@ -102,7 +103,7 @@ fn pictures_of_usual_sizes_fit_what_a_small_device_binds() {
         lanes: 4096,
         splitting: true,
         specular: true,
-        glossy: true,
+        lobes: [true; VISIBLE_LOBES.len()],
         meshes: 9,
         object_cells: 9 * 1024,
     };

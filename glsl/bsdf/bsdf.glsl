@@ -5,18 +5,6 @@
 
 #include "bsdf/dielectric.glsl"
 
-// The base and the reflection of what isn't glass.
-Bsdf bsdf_of(Material material) {
-    Bsdf bsdf = lambertian(material.base_color);
-    if (is_glossy(material)) {
-        bsdf = Bsdf(material.base_color * (1.0 - material.metallic),
-                    mix(material.specular_f0, material.base_color, material.metallic),
-                    mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness,
-                    vec2(largest(material.specular_f0), material.specular_f90), material.coat);
-    }
-    return bsdf;
-}
-
 // A surface that passes a part of the light only is by chance all clear or all glossy; u is a uniform number again after that.
 void choose_part(inout Material material, inout float u) {
     if (is_mixed(material)) {
@@ -44,13 +32,7 @@ float choose_layer(inout SurfaceInteraction met, vec3 incoming, float u) {
         factor = 1.0 / (is_coat ? p : 1.0 - p);
         if (is_coat) {
             met.frame.shading_normal = n;
-            met.material.surface = GLOSSY_SURFACE;
-            met.material.base_color = vec3(0.0);
-            met.material.metallic = 0.0;
-            met.material.roughness = met.material.coat_roughness;
-            met.material.specular_f0 = vec3(COAT_F0 * coat);
-            met.material.specular_f90 = coat;
-            met.material.coat = 0.0;
+            met.material = coat_of(met.material);
         }
     }
     return factor;
@@ -88,9 +70,7 @@ vec3 evaluate_followed(SurfaceInteraction met, vec3 viewer, vec3 l) {
     if (is_dielectric(met.material)) {
         response = evaluate_dielectric(met.frame, viewer, l, met.material, met.outside) * (same_side ? vec3(1.0) : met.tint);
     } else if (same_side && dot(l, n) > 0.0) {
-        Bsdf bsdf = bsdf_of(met.material);
-        bsdf.diffuse = vec3(0.0);
-        response = evaluate_bsdf(bsdf, n, viewer, l) * dot(l, n);
+        response = evaluate_boundary(bsdf_of(met.material), n, viewer, l) * dot(l, n);
     }
     return response;
 }
@@ -129,7 +109,7 @@ Branching branch_bsdf(SurfaceInteraction met, vec3 incoming, vec2 u, inout float
         float p = reflection_probability(bsdf, cosine);
         ways.reflected = mirror_direction(met.frame, incoming);
         if (bsdf.alpha >= SMOOTH_ALPHA) {
-            ways.reflected = reflected_direction(bsdf.alpha, n, -incoming, u);
+            ways.reflected = reflected_direction(bsdf, n, -incoming, u);
         }
         ways.reflectance = p;
         // Microfacets may reflect into the surface.
@@ -184,13 +164,13 @@ vec3 scatter(Bsdf bsdf, ShadingFrame frame, vec3 v, vec4 u, inout vec3 outgoing)
     if (reflects) {
         outgoing = mirror_direction(frame, -v);
         if (!is_smooth) {
-            outgoing = reflected_direction(bsdf.alpha, n, v, u.xy);
+            outgoing = reflected_direction(bsdf, n, v, u.xy);
         }
     }
     float cosine = max(dot(outgoing, frame.geometric_normal), 0.0);
-    float density = mix(cosine * (1.0 / PI), reflected_density(bsdf.alpha, n, v, outgoing), p);
+    float density = mix(cosine * (1.0 / PI), reflected_density(bsdf, n, v, outgoing), p);
     float over_density = is_smooth ? PI / (1.0 - p) : cosine / max(density, 1e-20);
-    vec3 mirrored = fresnel(bsdf, nv) * (coat_passes(bsdf.coat, nv) / p);
+    vec3 mirrored = mirrored_part(bsdf, nv, p);
     return is_smooth && reflects ? mirrored : evaluate_bsdf(bsdf, n, v, outgoing) * over_density;
 }
 

@@ -5,6 +5,7 @@
 
 #include "layout.glsl"
 #include "bsdf/material_features.glsl"
+#include "bsdf/reflection.glsl"
 #include "common/sampling.glsl"
 #include "trace/triangles.glsl"
 
@@ -57,6 +58,31 @@ bool is_matte(Material material) {
 
 bool is_rough_glass(Material material) {
     return ROUGH_GLASS && material.roughness * material.roughness >= SMOOTH_ALPHA;
+}
+
+// The base and the reflection of what isn't a dielectric.
+Bsdf bsdf_of(Material material) {
+    Bsdf bsdf = lambertian(material.base_color);
+    if (is_glossy(material)) {
+        bsdf = Bsdf(material.base_color * (1.0 - material.metallic),
+                    mix(material.specular_f0, material.base_color, material.metallic),
+                    mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness,
+                    vec2(largest(material.specular_f0), material.specular_f90), material.coat);
+    }
+    return bsdf;
+}
+
+// A clear coat by itself.
+Material coat_of(Material material) {
+    float coat = material.coat;
+    material.surface = GLOSSY_SURFACE;
+    material.base_color = vec3(0.0);
+    material.metallic = 0.0;
+    material.roughness = material.coat_roughness;
+    material.specular_f0 = vec3(COAT_F0 * coat);
+    material.specular_f90 = coat;
+    material.coat = 0.0;
+    return material;
 }
 
 // Whether it takes all light.
@@ -181,6 +207,13 @@ void lean_normals(Hit hit, MaterialPoint point, inout Surface surface) {
             }
         }
     }
+}
+
+// The material at a place, whose shading normals are turned.
+Material material_of(Hit hit, MaterialPoint point, inout Surface surface) {
+    Material material = textured_material(surface.material, point);
+    lean_normals(hit, point, surface);
+    return material;
 }
 
 // Of a material what its emission depends on, at a place.

@@ -44,12 +44,26 @@ vec3 evaluate_bsdf(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
     return nv > 0.0 && nl > 0.0 ? coat_passes(bsdf.coat, cosine) * value : vec3(0.0);
 }
 
+vec3 reflected_direction(Bsdf bsdf, vec3 n, vec3 v, vec2 u) {
+    return reflected_direction(bsdf.alpha, n, v, u);
+}
+
+// Its density per solid angle.
+float reflected_density(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
+    return reflected_density(bsdf.alpha, n, v, l);
+}
+
 // Share of the samples that go to the boundary's reflection: at least a quarter, for what it mirrors may be bright.
 float reflection_probability(Bsdf bsdf, float nv) {
     vec3 f = fresnel(bsdf, nv);
     float reflected = max(f.r, max(f.g, f.b));
     float under = max(bsdf.diffuse.r, max(bsdf.diffuse.g, bsdf.diffuse.b)) * (1.0 - reflected);
     return reflected <= 0.0 ? 0.0 : (under <= 0.0 ? 1.0 : max(reflected / (reflected + under), 0.25));
+}
+
+// The weight of what a smooth boundary mirrors, chosen with this probability.
+vec3 mirrored_part(Bsdf bsdf, float nv, float probability) {
+    return fresnel(bsdf, nv) * (coat_passes(bsdf.coat, nv) / probability);
 }
 
 // BRDF · cos / density of a direction from `reflected_direction`, or of a mirror's.
@@ -66,6 +80,12 @@ vec3 reflected_weight(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
 Bsdf base_of(Bsdf bsdf) {
     bsdf.alpha = 0.0;
     return bsdf;
+}
+
+// The value of its boundary alone.
+vec3 evaluate_boundary(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
+    bsdf.diffuse = vec3(0.0);
+    return evaluate_bsdf(bsdf, n, v, l);
 }
 
 // Whether it scatters anything that isn't followed.
@@ -100,13 +120,22 @@ vec3 weight_of(Bsdf bsdf) {
     return weight;
 }
 
-Gloss pack_bsdf(Bsdf bsdf, vec3 viewer, bool coated) {
-    return Gloss(vec4(bsdf.diffuse, uintBitsToFloat(encode_direction(viewer))),
+PackedBsdf pack_bsdf(Bsdf bsdf, vec3 viewer, bool coated) {
+    return PackedBsdf(vec4(bsdf.diffuse, uintBitsToFloat(encode_direction(viewer))),
                  uvec4(packHalf2x16(bsdf.f0.rg), packHalf2x16(vec2(bsdf.f0.b, bsdf.f90)),
                        packHalf2x16(vec2(bsdf.alpha, bsdf.coat)) | (coated ? COATED : 0u), packHalf2x16(bsdf.over_base)));
 }
 
-VisibleBsdf unpack_bsdf(Gloss packed, vec3 normal) {
+// Into and out of the buffer of all. (Macros, see common/texel.glsl.)
+#define STORE_BSDF(buffer, slot, bsdf, viewer, coated)                                                                             \
+    {                                                                                                                              \
+        PackedBsdf packed = pack_bsdf(bsdf, viewer, coated);                                                                       \
+        buffer[2u * (slot)] = floatBitsToUint(packed.diffuse_viewer);                                                              \
+        buffer[2u * (slot) + 1u] = packed.rest;                                                                                    \
+    }
+#define LOAD_BSDF(buffer, slot, normal) unpack_bsdf(PACKED_BSDF(buffer, slot), normal)
+
+VisibleBsdf unpack_bsdf(PackedBsdf packed, vec3 normal) {
     vec2 f0_b_f90 = unpackHalf2x16(packed.rest.y);
     vec2 alpha_coat = unpackHalf2x16(packed.rest.z);
     Bsdf bsdf = Bsdf(packed.diffuse_viewer.rgb, vec3(unpackHalf2x16(packed.rest.x), f0_b_f90.x), f0_b_f90.y,
@@ -153,7 +182,7 @@ vec3 sample_bsdf(VisibleBsdf visible, vec3 u) {
     vec3 l = cosine_direction(visible.normal, u.yz);
     if (GLOSSY) {
         if (u.x < probability_of_lobe(visible)) {
-            l = reflected_direction(visible.bsdf.alpha, visible.normal, visible.viewer, u.yz);
+            l = reflected_direction(visible.bsdf, visible.normal, visible.viewer, u.yz);
         }
     }
     return l;
@@ -163,7 +192,7 @@ vec3 sample_bsdf(VisibleBsdf visible, vec3 u) {
 float bsdf_density(VisibleBsdf visible, vec3 l) {
     float density = dot(l, visible.normal) / PI;
     if (has_narrow_lobe(visible)) {
-        float of_lobe = reflected_density(visible.bsdf.alpha, visible.normal, visible.viewer, l);
+        float of_lobe = reflected_density(visible.bsdf, visible.normal, visible.viewer, l);
         density = mix(density, of_lobe, probability_of_lobe(visible));
     }
     return density;

@@ -7,7 +7,7 @@ layout(constant_id = 0) const bool COUNT_TESTS = false;
 
 uniform usamplerBuffer VisiblePoints;
 uniform usamplerBuffer Radii2;
-uniform usamplerBuffer GlossOf;
+uniform usamplerBuffer PackedBsdfs;
 layout(std430) buffer GatheredOf { Gathered gathered[]; };
 layout(std430) buffer TestsOf { uint tests[]; }; // photons tested for each slot and map, and GATHERED_FOR, where they are counted
 
@@ -37,7 +37,7 @@ Receiver receiver_at(uint slot, uint map) {
     receiver.object |= receiver.object != NO_OBJECT && map == 1u ? CAUSTIC : 0u;
     receiver.normal = decode_octahedral(floatBitsToUint(point.weight_normal.w));
     if (carries_bsdf()) {
-        receiver.bsdf = unpack_bsdf(GLOSS(GlossOf, slot), decode_direction(floatBitsToUint(point.emitted_normal.w)));
+        receiver.bsdf = LOAD_BSDF(PackedBsdfs, slot, decode_direction(floatBitsToUint(point.emitted_normal.w)));
     }
     return receiver;
 }

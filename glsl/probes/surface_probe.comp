@@ -45,8 +45,7 @@ void main() {
     float there = opacity(hit);
     MaterialPoint point = material_point(hit);
     Surface surface = surface_at(hit);
-    Material material = textured_material(surface.material, point);
-    lean_normals(hit, point, surface);
+    Material material = material_of(hit, point, surface);
     Found f;
     f.position = vec4(surface.position, there);
     f.geometric_normal = vec4(surface.geometric_normal, 0.0);

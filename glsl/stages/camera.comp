@@ -29,7 +29,7 @@ layout(push_constant) uniform Push {
 
 layout(std430) writeonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(std430) writeonly buffer Footprints { float footprints[]; };
-layout(std430) writeonly buffer GlossOf { Gloss gloss_of_slots[]; };
+layout(std430) writeonly buffer PackedBsdfs { uvec4 packed_bsdfs[]; };
 
 struct Branch {
     vec3 origin;
@@ -252,7 +252,7 @@ void main() {
                     }
                     if (stops && scatters(bsdf)) {
                         if (carries_bsdf()) {
-                            gloss_of_slots[slot] = pack_bsdf(bsdf, -incoming, has_coat(met.surface.material));
+                            STORE_BSDF(packed_bsdfs, slot, bsdf, -incoming, has_coat(met.surface.material));
                         }
                         found = true;
                         visible_points[slot].position_object =

@@ -29,7 +29,7 @@ layout(push_constant) uniform Push {
 } push;
 
 uniform usamplerBuffer VisiblePoints;
-uniform usamplerBuffer GlossOf;
+uniform usamplerBuffer PackedBsdfs;
 uniform usamplerBuffer StatisticsOf;
 layout(std430) buffer DirectSums { DirectSum direct_sums[]; };
 layout(std430) buffer CoverageOf { Coverage coverage[]; };
@@ -51,7 +51,7 @@ VisibleBsdf bsdf_of_slot(uint slot, vec3 shading_normal) {
     VisibleBsdf bsdf = no_visible_bsdf();
     bsdf.normal = shading_normal;
     if (carries_bsdf()) {
-        bsdf = unpack_bsdf(GLOSS(GlossOf, slot), shading_normal);
+        bsdf = LOAD_BSDF(PackedBsdfs, slot, shading_normal);
     }
     return bsdf;
 }

@@ -67,14 +67,13 @@ SurfaceInteraction interact(Hit hit, vec3 incoming, Media media, bool culls, Ran
     // Textures come first: the surface would hold registers.
     MaterialPoint point = material_point(place.hit);
     Surface surface = surface_at(place.hit);
-    Material material = textured_material(surface.material, point);
+    Material material = material_of(place.hit, point, surface);
     if (finds_coincident_faces()) {
         surface.reach = place.reach;
     } else if (is_solid(material)) {
         bool front = dot(incoming, surface.geometric_normal) < 0.0;
         cross_boundary(place, bounded_medium(media, surface, front), front);
     }
-    lean_normals(place.hit, point, surface);
     SurfaceInteraction met;
     met.surface = surface;
     met.material = material;

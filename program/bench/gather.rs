@@ -124,7 +124,7 @@ impl Input {
     fn seen(&self) -> SeenByKernels<'_> {
         SeenByKernels {
             points: &self.points,
-            gloss: &[],
+            bsdfs: &[],
             radii2: &self.radii2,
         }
     }
@@ -392,7 +392,7 @@ impl Measured {
         let radii2: Vec<f32> = maps.flat_map(|map| map.iter().copied().step_by(stride)).collect();
         let seen = SeenByKernels {
             points: &points,
-            gloss: &[],
+            bsdfs: &[],
             radii2: &radii2,
         };
         timed_us(|| cpu::gather_naive(&seen, &input.photons)).1

@@ -168,7 +168,7 @@ impl Bsdf {
                 let passes = coat_passes(reflector.coat, nv).max(0.25);
                 // Nor what a boundary mirrors, which may be bright.
                 let reflected = reflector.fresnel(nv).max_element().max(0.25 * reflector.f90);
-                let base = reflector.diffuse.max_element() * (1.0 - reflected).max(0.25);
+                let base = reflector.base_albedo() * (1.0 - reflected).max(0.25);
                 [base, reflected].map(|part| layer.share * passes * part)
             }
         }

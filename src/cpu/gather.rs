@@ -7,7 +7,7 @@ use super::reflector::Reflector;
 use super::sampling::decode_direction;
 use super::vector::{mean, word, xyz};
 use crate::kd_tree::KdTree;
-use crate::layout::{CAUSTIC, Gloss, NO_OBJECT, Photon, VisiblePoint};
+use crate::layout::{CAUSTIC, NO_OBJECT, PackedBsdf, Photon, VisiblePoint};
 
 /// How much farther than R the kd-tree is asked: more than the rounding of the squared distance, which the tree and
 /// the predicate sum up differently.
@@ -80,7 +80,7 @@ pub struct SeenByKernels<'a> {
     /// Visible points.
     pub points: &'a [VisiblePoint],
     /// How they scatter; empty where the scene has no glossy surfaces.
-    pub gloss: &'a [Gloss],
+    pub bsdfs: &'a [PackedBsdf],
     /// R².
     pub radii2: &'a [f32],
 }
@@ -105,8 +105,8 @@ impl Receivers for SeenByKernels<'_> {
 
     fn response(&self, index: usize, l: DVec3) -> DVec3 {
         let slot = index % self.points.len();
-        self.gloss.get(slot).map_or(DVec3::ONE, |gloss| {
-            let (reflector, viewer, coated) = Reflector::of_gloss(gloss);
+        self.bsdfs.get(slot).map_or(DVec3::ONE, |packed| {
+            let (reflector, viewer, coated) = Reflector::of_packed(packed);
             let normal = decode_direction(word(self.points[slot].emitted_normal));
             // Photons on coated objects have their flux across their rays, since each layer has a normal of its own.
             let cosine = if coated { l.dot(normal).max(0.0) } else { 1.0 };

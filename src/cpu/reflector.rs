@@ -8,7 +8,7 @@ use half::f16;
 
 use super::sampling::{basis, decode_direction};
 use super::vector::{rgb, word, xyz};
-use crate::layout::{COAT_F0, COATED, Gloss, Material, SMOOTH_ALPHA};
+use crate::layout::{COAT_F0, COATED, Material, PackedBsdf, SMOOTH_ALPHA};
 
 /// The fifth power of 1 − cosine.
 pub(super) fn schlick(cosine: f64) -> f64 {
@@ -96,19 +96,24 @@ impl Reflector {
     }
 
     /// What a visible point of the kernels keeps, the direction to the viewer, and whether the material is coated.
-    pub(super) fn of_gloss(gloss: &Gloss) -> (Self, DVec3, bool) {
+    pub(super) fn of_packed(packed: &PackedBsdf) -> (Self, DVec3, bool) {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
-        let [f0_rg, f0_b_f90, alpha_coat, over_base] = gloss.rest.map(|word| [half(word), half(word >> 16)]);
+        let [f0_rg, f0_b_f90, alpha_coat, over_base] = packed.rest.map(|word| [half(word), half(word >> 16)]);
         let reflector = Self {
-            diffuse: xyz(gloss.diffuse_viewer),
+            diffuse: xyz(packed.diffuse_viewer),
             f0: DVec3::new(f0_rg[0], f0_rg[1], f0_b_f90[0]),
             f90: f0_b_f90[1],
             over_base,
             alpha: alpha_coat[0].abs(),
             coat: alpha_coat[1],
         };
-        let viewer = decode_direction(word(gloss.diffuse_viewer));
-        (reflector, viewer, gloss.rest[2] & COATED != 0)
+        let viewer = decode_direction(word(packed.diffuse_viewer));
+        (reflector, viewer, packed.rest[2] & COATED != 0)
+    }
+
+    /// Albedo of the base in the strongest channel, as far as it chooses among lobes.
+    pub(super) fn base_albedo(&self) -> f64 {
+        self.diffuse.max_element()
     }
 
     /// The same without its base.

@@ -8,8 +8,7 @@ use super::interaction::is_hidden_back;
 use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
 use super::sampling::decode_direction;
 use super::surface::{Surface, surface_of};
-use super::vector::rgb;
-use crate::layout::{BLEND, MASK, NO_TEXTURE, SEE_THROUGH, TEXTURED_TRIANGLE};
+use crate::layout::{BLEND, MASK, Material, NO_TEXTURE, SEE_THROUGH, TEXTURE_FACTORS, TEXTURED_TRIANGLE};
 use crate::packing::PackedScene;
 use crate::random::Random;
 
@@ -63,43 +62,29 @@ pub fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
     }
     let place = Place::of(scene, surface.triangle, surface.uv);
     let at = |texture: u32| value(scene, texture, &place);
-    let times = |color: [f32; 3], factor: DVec3| (rgb(color) * factor).as_vec3().to_array();
-    let textures = surface.material;
-    let material = &mut surface.material;
-    let color = at(textures.color_texture).unwrap_or(DVec4::ONE) * place.color;
-    material.base_color = times(material.base_color, color.truncate()).map(|value| value.min(1.0));
-    if let Some(value) = at(textures.metal_texture) {
-        material.roughness *= value.y as f32;
-        material.metallic *= value.z as f32;
+    let maps = surface.material;
+    let mut numbers: [f32; size_of::<Material>() / 4] = bytemuck::cast(maps);
+    let words: [u32; size_of::<Material>() / 4] = bytemuck::cast(maps);
+    for map in TEXTURE_FACTORS {
+        if let Some(value) = at(words[map.texture / 4]) {
+            for (number, &channel) in numbers[map.factor / 4..].iter_mut().zip(map.channels) {
+                *number = (f64::from(*number) * value[channel]) as f32;
+            }
+        }
     }
-    if let Some(value) = at(textures.emission_texture) {
-        material.emission = times(material.emission, value.truncate());
+    surface.material = bytemuck::cast(numbers);
+    let colors = place.color.truncate().to_array();
+    for (number, color) in surface.material.base_color.iter_mut().zip(colors) {
+        *number = ((f64::from(*number) * color) as f32).min(1.0);
     }
-    if let Some(value) = at(textures.transmission_texture) {
-        material.transmission *= value.x as f32;
-    }
-    if let Some(value) = at(textures.specular_texture) {
-        material.specular_f0 = times(material.specular_f0, DVec3::splat(value.w));
-        material.specular_f90 *= value.w as f32;
-    }
-    if let Some(value) = at(textures.specular_color_texture) {
-        material.specular_f0 = times(material.specular_f0, value.truncate());
-    }
-    if let Some(value) = at(textures.normal_texture) {
-        let scale = textures.normal_scale.into();
-        surface.shading_normal = leaning_normal(surface.shading_normal, surface, &place, value.truncate(), scale);
-    }
-    let material = &mut surface.material;
-    if let Some(value) = at(textures.coat_texture) {
-        material.coat *= value.x as f32;
-    }
-    if let Some(value) = at(textures.coat_roughness_texture) {
-        material.coat_roughness *= value.y as f32;
-    }
-    if let Some(value) = at(textures.coat_normal_texture) {
-        let scale = textures.coat_normal_scale.into();
-        surface.coat_normal = leaning_normal(surface.coat_normal, surface, &place, value.truncate(), scale);
-    }
+    let leaning = |n: DVec3, texture: u32, scale: f32| {
+        at(texture).map_or(n, |value| {
+            leaning_normal(n, surface, &place, value.truncate(), scale.into())
+        })
+    };
+    let shading = leaning(surface.shading_normal, maps.normal_texture, maps.normal_scale);
+    let coat = leaning(surface.coat_normal, maps.coat_normal_texture, maps.coat_normal_scale);
+    (surface.shading_normal, surface.coat_normal) = (shading, coat);
 }
 
 /// The normal that a texture leans `n` to, on the side of the geometric one.

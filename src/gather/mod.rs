@@ -8,7 +8,7 @@ pub use clustered::grid_sizes;
 pub use primitives::{PHOTON_PAIRS, POINT_PAIRS, Pairs, scan, sort};
 
 use self::ladder::{photons, points};
-use crate::layout::GROUP;
+use crate::layout::{GROUP, VISIBLE_LOBES};
 use crate::record::Recording;
 use crate::sizes::Sizes;
 use crate::stage::{Shader, StageDesc};
@@ -195,10 +195,9 @@ pub fn is_gather_stage(stage: &str) -> bool {
 }
 
 fn gather_stage(shader: &'static Shader, threads: u32, sizes: &Sizes) -> StageDesc {
-    StageDesc::new(shader, threads).constants(vec![
-        ("COUNT_TESTS", u32::from(sizes.probe.count_tests)),
-        ("GLOSSY", u32::from(sizes.glossy)),
-    ])
+    let mut constants = vec![("COUNT_TESTS", u32::from(sizes.probe.count_tests))];
+    constants.extend(VISIBLE_LOBES.into_iter().zip(sizes.lobes.map(u32::from)));
+    StageDesc::new(shader, threads).constants(constants)
 }
 
 /// First and end of the photons of each launch of a gather: one launch, unless the driver cuts loops.

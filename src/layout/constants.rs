@@ -159,7 +159,7 @@ shared_constants! {
     /// No medium: what a set of four has where it has fewer. It comes last.
     pub const VACUUM: u32 = u32::MAX;
 
-    /// In [`super::Gloss::rest`], the sign of α: whether the material is coated.
+    /// In [`super::PackedBsdf::rest`], the sign of α: whether the material is coated.
     pub const COATED: u32 = 0x8000;
 
     /// Pixels of a tile's side: visible points lie in memory tile by tile.

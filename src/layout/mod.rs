@@ -33,16 +33,19 @@ macro_rules! device_structs {
 }
 
 pub mod constants;
+mod material;
 mod render;
 mod scene;
 mod shape;
 
 pub use constants::*;
+pub use material::*;
 pub use render::*;
 pub use scene::*;
 pub use shape::{FieldLayout, Layout, Scalar, Shape, Shared};
 
 /// Every struct.
 pub fn layouts() -> impl Iterator<Item = &'static Layout> {
-    scene::LAYOUTS.iter().chain(render::LAYOUTS)
+    let rooms = [scene::LAYOUTS, material::LAYOUTS, render::LAYOUTS];
+    rooms.into_iter().flatten()
 }

@@ -83,16 +83,6 @@ device_structs! {
         pub emitted_normal: [f32; 4],
     }
 
-    /// How a visible point's surface scatters, where the scene has glossy ones.
-    pub struct Gloss: 32 {
-        /// rgb: albedo under the reflecting boundary; w: u32 bits, octahedral direction to the viewer.
-        pub diffuse_viewer: [f32; 4],
-        /// f16s, two to a word: reflectance of the boundary at normal incidence, linear RGB, and at grazing incidence; GGX's α, 0
-        /// where the path followed the reflection itself; how much of a coat there is; the largest channel of what lies over
-        /// the base at both angles. α's sign: whether the material is coated.
-        pub rest: [u32; 4],
-    }
-
     /// Where a photon path starts.
     pub struct PathStart: 48 {
         /// Position.

@@ -1,7 +1,8 @@
 //! Names of glTF extensions without a feature of the `gltf` crate.
 
+use super::material::layers;
+
 pub(crate) const BASISU: &str = "KHR_texture_basisu";
-pub(crate) const CLEARCOAT: &str = "KHR_materials_clearcoat";
 pub(crate) const DRACO: &str = "KHR_draco_mesh_compression";
 pub(crate) const MESHOPT: &str = "EXT_meshopt_compression";
 pub(crate) const MESH_INSTANCING: &str = "EXT_mesh_gpu_instancing";
@@ -9,11 +10,14 @@ pub(crate) const QUANTIZATION: &str = "KHR_mesh_quantization";
 pub(crate) const VARIANTS: &str = "KHR_materials_variants";
 pub(crate) const WEBP: &str = "EXT_texture_webp";
 
-/// The extensions that a file may list as required. Those of materials are features of the `gltf` crate that
-/// `Cargo.toml` turns on.
-pub(crate) const SUPPORTED: &[&str] = &[
+/// Whether a file may list it as required.
+pub(crate) fn is_supported(extension: &str) -> bool {
+    SUPPORTED.contains(&extension) || layers::EXTENSIONS.contains(&extension)
+}
+
+/// Those beside [`layers::EXTENSIONS`]; those of materials are features of the `gltf` crate that `Cargo.toml` turns on.
+const SUPPORTED: &[&str] = &[
     "KHR_lights_punctual",
-    CLEARCOAT,
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",

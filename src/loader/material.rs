@@ -1,17 +1,16 @@
 //! Reduces glTF materials to what the renderer does, and says what is left out.
 
-use crate::loader::extensions::CLEARCOAT;
-use crate::scene::normal_reflectance;
+pub(crate) mod layers;
+
 use glam::Vec3;
 use gltf_json::extensions::material::Volume;
 use gltf_json::material::{AlphaMode, NormalTexture};
 use gltf_json::texture::Info;
 use gltf_json::validation::Checked;
 
-use super::clearcoat::Clearcoat;
 use super::diagnostic::{Check, Warnings, damaged, label};
 use super::texture::{TextureReader, TextureUse};
-use crate::scene::{Alpha, Coat, Dielectric, Gloss, Material, MaterialTextures, Surface};
+use crate::scene::{Alpha, Dielectric, Gloss, Layers, Material, MaterialTextures, Surface, normal_reflectance};
 use crate::text::shorten;
 
 /// Index of refraction where the file gives none.
@@ -87,12 +86,12 @@ impl Reader<'_> {
         let [alpha] = self.fractions("alpha of its baseColorFactor", [alpha])?;
         let base_color = self.fractions("baseColorFactor", [red, green, blue])?;
         let unlit = self.extension(|extensions| extensions.unlit.as_ref()).is_some();
-        let coat = self.coat()?;
-        let (surface, emission) = (self.surface(coat.factor > 0.0)?, self.emission()?);
-        let (surface, coat, base_color, emission) = if unlit {
-            (Surface::Matte, Coat::default(), Vec3::ZERO, base_color.into())
+        let layers = self.layers()?;
+        let (surface, emission) = (self.surface(&layers)?, self.emission()?);
+        let (surface, layers, base_color, emission) = if unlit {
+            (Surface::Matte, Layers::default(), Vec3::ZERO, base_color.into())
         } else {
-            (surface, coat, base_color.into(), emission)
+            (surface, layers, base_color.into(), emission)
         };
         Ok(Material {
             name: match &self.json.name {
@@ -100,7 +99,7 @@ impl Reader<'_> {
                 None => format!("material {index}"),
             },
             surface,
-            coat,
+            layers,
             base_color,
             emission,
             back_emits: self.json.double_sided || unlit,
@@ -121,7 +120,7 @@ impl Reader<'_> {
     }
 
     /// A metal is a metal even where it claims to transmit: glTF mixes the two lobes by metallicFactor first.
-    fn surface(&mut self, coated: bool) -> Check<Surface> {
+    fn surface(&mut self, layers: &Layers) -> Check<Surface> {
         let pbr = &self.json.pbr_metallic_roughness;
         let [metallic] = self.fractions("metallicFactor", [pbr.metallic_factor.0])?;
         let [roughness] = self.fractions("roughnessFactor", [pbr.roughness_factor.0])?;
@@ -138,11 +137,11 @@ impl Reader<'_> {
         if all_metal && transmission > 0.0 {
             self.warn("metallicFactor 1 leaves nothing of its transmission, and it is rendered as metal; set it to 0 for glass".into());
         }
-        if all_metal && roughness == 0.0 {
+        if all_metal && roughness == 0.0 && !layers.hide_mirrors() {
             return Ok(Surface::Mirror);
         }
         let is_clear = transmission > 0.0 && !all_metal;
-        if !is_clear && metallic == 0.0 && specular == 0.0 && !coated {
+        if !is_clear && metallic == 0.0 && specular == 0.0 && !layers.are_glossy() {
             return Ok(Surface::Matte);
         }
         // KHR_materials_ior and KHR_materials_specular.
@@ -197,19 +196,6 @@ impl Reader<'_> {
         Ok(dispersion)
     }
 
-    fn clearcoat(&self) -> Check<Clearcoat> {
-        let clearcoat = Clearcoat::of(self.json).transpose();
-        let clearcoat = clearcoat.map_err(|error| damaged(format_args!("its {}: {error}", CLEARCOAT)))?;
-        Ok(clearcoat.unwrap_or_default())
-    }
-
-    fn coat(&mut self) -> Check<Coat> {
-        let clearcoat = self.clearcoat()?;
-        let [factor] = self.fractions("clearcoatFactor", [clearcoat.clearcoat_factor])?;
-        let [roughness] = self.fractions("clearcoatRoughnessFactor", [clearcoat.clearcoat_roughness_factor])?;
-        Ok(Coat { factor, roughness })
-    }
-
     fn emission(&mut self) -> Check<Vec3> {
         let strength = self.extension(|extensions| extensions.emissive_strength.as_ref());
         let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
@@ -253,61 +239,37 @@ impl Reader<'_> {
         let pbr = &json.pbr_metallic_roughness;
         let transmission = self.extension(|extensions| extensions.transmission.as_ref());
         let specular = self.extension(|extensions| extensions.specular.as_ref());
-        let linear = |info: &Info| used(info, false);
-        let color = |info: &Info| used(info, true);
-        let coat = self.clearcoat()?;
-        let normals = [
-            ("normalTexture", json.normal_texture.as_ref()),
-            ("clearcoatNormalTexture", coat.clearcoat_normal_texture.as_ref()),
-        ];
-        let mut uses_of_normals = [None, None];
-        for (normals, (name, texture)) in uses_of_normals.iter_mut().zip(normals) {
-            *normals = texture.map(|texture| used_normals(name, texture)).transpose()?;
-        }
-        let [normal, coat_normal] = uses_of_normals;
+        let normals = json.normal_texture.as_ref();
+        let mut textures = MaterialTextures {
+            normal_scale: normals.map_or(0.0, |texture| texture.scale),
+            ..MaterialTextures::default()
+        };
+        let normals = normals.map(|texture| used_normals("normalTexture", texture));
         let uses = [
-            pbr.base_color_texture.as_ref().map(color),
-            pbr.metallic_roughness_texture.as_ref().map(linear),
-            normal,
-            json.emissive_texture.as_ref().map(color),
-            transmission.and_then(|it| it.transmission_texture.as_ref()).map(linear),
-            specular.and_then(|it| it.specular_texture.as_ref()).map(linear),
-            specular.and_then(|it| it.specular_color_texture.as_ref()).map(color),
-            coat.clearcoat_texture.as_ref().map(linear),
-            coat.clearcoat_roughness_texture.as_ref().map(linear),
-            coat_normal,
+            (&mut textures.base_color, pbr.base_color_texture.as_ref().map(color)),
+            (
+                &mut textures.metallic_roughness,
+                pbr.metallic_roughness_texture.as_ref().map(linear),
+            ),
+            (&mut textures.normal, normals.transpose()?),
+            (&mut textures.emission, json.emissive_texture.as_ref().map(color)),
+            (
+                &mut textures.transmission,
+                transmission.and_then(|it| it.transmission_texture.as_ref()).map(linear),
+            ),
+            (
+                &mut textures.specular,
+                specular.and_then(|it| it.specular_texture.as_ref()).map(linear),
+            ),
+            (
+                &mut textures.specular_color,
+                specular.and_then(|it| it.specular_color_texture.as_ref()).map(color),
+            ),
         ];
-        let [scale, coat_scale] = normals.map(|(_, texture)| texture.map_or(1.0, |texture| texture.scale));
-        let mut found = [None; 10];
-        for (found, wanted) in found.iter_mut().zip(&uses) {
-            if let Some(wanted) = wanted {
-                *found = reader.lookup(wanted, &mut self.warnings)?;
-            }
-        }
-        let [
-            base_color,
-            metallic_roughness,
-            normal,
-            emission,
-            transmission,
-            specular,
-            specular_color,
-            coat,
-            coat_roughness,
-            coat_normal,
-        ] = found;
-        Ok(MaterialTextures {
-            base_color,
-            metallic_roughness,
-            normal: normal.map(|index| (index, scale)),
-            emission,
-            transmission,
-            specular,
-            specular_color,
-            coat,
-            coat_roughness,
-            coat_normal: coat_normal.map(|index| (index, coat_scale)),
-        })
+        look_up(uses, reader, &mut self.warnings)?;
+        let of_layers = self.layer_textures(&mut textures)?;
+        look_up(of_layers, reader, &mut self.warnings)?;
+        Ok(textures)
     }
 
     fn extension<'s, T>(
@@ -351,6 +313,30 @@ fn used_normals(name: &str, texture: &NormalTexture) -> Check<TextureUse> {
         transform: transform.map_err(|error| damaged(format_args!("its {name}: {error}")))?,
         srgb: false,
     })
+}
+
+/// Looks textures up, each for its place.
+fn look_up<'t>(
+    uses: impl IntoIterator<Item = (&'t mut Option<u32>, Option<TextureUse>)>,
+    reader: &mut TextureReader<'_>,
+    warnings: &mut Vec<String>,
+) -> Check<()> {
+    for (found, wanted) in uses {
+        if let Some(wanted) = wanted {
+            *found = reader.lookup(&wanted, warnings)?;
+        }
+    }
+    Ok(())
+}
+
+/// A texture of numbers.
+fn linear(info: &Info) -> TextureUse {
+    used(info, false)
+}
+
+/// A texture of colours.
+fn color(info: &Info) -> TextureUse {
+    used(info, true)
 }
 
 fn used(info: &Info, srgb: bool) -> TextureUse {

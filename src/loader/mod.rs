@@ -2,7 +2,6 @@
 
 mod animation;
 mod camera;
-mod clearcoat;
 mod curve;
 mod diagnostic;
 mod extensions;
@@ -200,7 +199,7 @@ fn load(path: &Path, options: LoadOptions, budget: Budget) -> Check<Scene> {
 fn warn_of_ignored(document: &Document, options: &LoadOptions, warnings: &mut Warnings) {
     let root = &document.root;
     for extension in &root.extensions_used {
-        if !extensions::SUPPORTED.contains(&extension.as_str()) {
+        if !extensions::is_supported(extension) {
             warnings.push(format!(
                 "the extension {} isn't supported and is ignored, so that what it describes looks as it does without it, as in other \
                  viewers that don't know it",

@@ -2,14 +2,14 @@
 
 use super::part::Part;
 use crate::layout::{
-    BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, GLOSSY_SURFACE, Light, MIRROR,
-    Material, NO_TEXTURE, POINT_LIGHT, SEE_THROUGH, SPECULAR_CHANGED, SPOT_LIGHT, ShadingTriangle, TEXTURED_TRIANGLE,
-    TOUCHED, TRIANGLE_LIGHT,
+    BACKED, COINCIDENT, DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, Material, POINT_LIGHT, SEE_THROUGH, SPOT_LIGHT,
+    ShadingTriangle, TEXTURED_TRIANGLE, TOUCHED, TRIANGLE_LIGHT, VISIBLE_LOBES, VisibleLobes,
 };
+use crate::scene::material_features;
 
-/// Declares the features, each with its constant in the kernels.
+/// Declares the features, each with its constant in the kernels, and with the materials' records that have it.
 macro_rules! features {
-    ($($(#[$doc:meta])* $feature:ident: $constant:literal,)*) => {
+    ($($(#[$doc:meta])* $feature:ident: $constant:literal $(= $has:expr)?,)*) => {
         /// What a scene has. Each is a specialisation constant of the stages that trace rays.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
         pub struct SceneFeatures {
@@ -32,27 +32,18 @@ macro_rules! features {
                 let [$($feature,)*] = values;
                 Self { $($feature,)* }
             }
+
+            fn add_material(&mut self, material: &Material) {
+                $($(
+                    let has: fn(&Material) -> bool = $has;
+                    self.$feature |= has(material);
+                )?)*
+            }
         }
     };
 }
 
-features! {
-    /// Mirrors.
-    mirror: "MIRRORS",
-    /// Boundaries of dielectrics.
-    dielectric: "DIELECTRICS",
-    /// Microfacets over a base.
-    glossy: "GLOSSY",
-    /// Microfacets of dielectrics.
-    rough_glass: "ROUGH_GLASS",
-    /// Dielectrics without an inside.
-    thin_walls: "THIN_WALLS",
-    /// Dielectrics that pass a part of the light only.
-    partly_clear: "PARTLY_CLEAR",
-    /// Dielectrics that absorb light inside.
-    absorption: "ABSORPTION",
-    /// Dielectrics that bend each wavelength its own way.
-    dispersion: "DISPERSION",
+material_features! { features
     /// Boundaries of dielectrics that lie on other faces.
     contact: "CONTACT",
     /// Dielectrics inside of others, or overlapping them.
@@ -73,12 +64,6 @@ features! {
     textured: "TEXTURED",
     /// Surfaces that aren't there everywhere.
     alpha: "ALPHA",
-    /// Clear coats.
-    coat: "CLEARCOAT",
-    /// Dielectrics that reflect more or less than their index says.
-    specular_glass: "SPECULAR_GLASS",
-    /// Surfaces whose back no camera sees.
-    culling: "CULLING",
     /// Instances that share triangles.
     instanced: "INSTANCED",
     /// Several sources of light, so few that direct light asks each.
@@ -95,21 +80,7 @@ impl SceneFeatures {
         let mut features = Self::default();
         for triangle in triangles {
             let material = &materials[triangle.material as usize];
-            let glass = material.surface == DIELECTRIC;
-            // A texture makes less of the factor.
-            let clear = material.transmission == 1.0 && material.transmission_texture == NO_TEXTURE;
-            let mixed = glass && !(clear && material.metallic == 0.0);
-            features.mirror |= material.surface == MIRROR;
-            features.dielectric |= glass;
-            features.glossy |= material.surface == GLOSSY_SURFACE || mixed || material.coat > 0.0;
-            features.rough_glass |= glass && material.roughness > 0.0;
-            features.thin_walls |= glass && material.thin != 0;
-            features.partly_clear |= mixed;
-            features.absorption |= glass && material.absorption != [0.0; 3];
-            features.dispersion |= glass && material.dispersion > 0.0;
-            features.culling |= material.flags & BACK_HIDDEN != 0;
-            features.coat |= material.coat > 0.0;
-            features.specular_glass |= glass && material.flags & SPECULAR_CHANGED != 0;
+            features.add_material(material);
             features.textured |= triangle.flags & TEXTURED_TRIANGLE != 0;
             features.alpha |= triangle.flags & SEE_THROUGH != 0;
             features.contact |= triangle.flags & TOUCHED != 0;
@@ -122,6 +93,12 @@ impl SceneFeatures {
             features.environment |= light.kind == ENVIRONMENT_LIGHT;
         }
         features
+    }
+
+    /// Those that the BSDFs of visible points have.
+    pub fn visible_lobes(self) -> VisibleLobes {
+        let constants = self.constants();
+        VISIBLE_LOBES.map(|lobe| constants.contains(&(lobe, true)))
     }
 
     /// A constant's name for people.

@@ -36,13 +36,10 @@ use self::near_lights::NearLights;
 use self::nesting::Nesting;
 use self::object_grid::object_grids;
 use crate::layout::{
-    BACK_EMITS, BACK_HIDDEN, BLEND, BvhRecord, Corner, DIELECTRIC, GLOSSY_SURFACE, HavelTriangle, Instance, Light,
-    LightSource, MASK, MIRROR, MIRRORED, Material, NO_LIGHT, NO_TEXTURE, OPAQUE, ObjectGrid, RANK, SEE_THROUGH,
-    SMOOTH_SHADED, SPECULAR_CHANGED, ShadingTriangle, TEXTURED_TRIANGLE, TRIANGLE_LIGHT, TextureLookup,
+    BACK_EMITS, BvhRecord, Corner, HavelTriangle, Instance, Light, LightSource, MIRRORED, Material, NO_LIGHT,
+    ObjectGrid, RANK, SEE_THROUGH, SMOOTH_SHADED, ShadingTriangle, TEXTURED_TRIANGLE, TRIANGLE_LIGHT, TextureLookup,
 };
-use crate::scene::{
-    Alpha, Dielectric, Environment, Gloss, MaterialTextures, SHARED, Scene, Surface, area, normal_reflectance,
-};
+use crate::scene::{Alpha, Environment, SHARED, Scene, area};
 
 /// Sources of light of which each is asked by a ray of its own; of more one is chosen.
 const ASKED_ALL: usize = 4;
@@ -147,7 +144,7 @@ impl PackedScene {
         for &[double, light] in &light_table.doubles {
             shading_triangles[double as usize].light = shading_triangles[light as usize].light;
         }
-        let materials: Vec<Material> = scene.materials.iter().map(material).collect();
+        let materials: Vec<Material> = scene.materials.iter().map(crate::scene::Material::record).collect();
         let nesting = Nesting::of(scene)?;
         let instances = instances(scene, &placed, &bvh.shared, &nesting.ranks);
         let coincident = coincident_faces::coincident_faces(&bvh.records, &shading_triangles, &instances, &materials);
@@ -322,7 +319,7 @@ fn shading_triangle(scene: &Scene, index: u32, material_index: u32, corners: &[V
         let color = scene.colors.get(vertex as usize);
         color.is_some_and(|color| *color != Vec4::ONE)
     });
-    let textured = colored || material.textures != MaterialTextures::default();
+    let textured = colored || material.needs_corners();
     ShadingTriangle {
         p0: vertex(0),
         p1: vertex(1),
@@ -338,68 +335,6 @@ fn shading_triangle(scene: &Scene, index: u32, material_index: u32, corners: &[V
             },
         light: NO_LIGHT,
     }
-}
-
-fn material(material: &crate::scene::Material) -> Material {
-    let (surface, glass, gloss) = match material.surface {
-        Surface::Matte => (0, None, Gloss::default()),
-        Surface::Mirror => (MIRROR, None, Gloss::default()),
-        Surface::Dielectric(glass) => (DIELECTRIC, Some(glass), glass.gloss),
-        Surface::Glossy(gloss) => (GLOSSY_SURFACE, None, gloss),
-    };
-    let inside = glass.unwrap_or(Dielectric::clear(1.0));
-    let textures = &material.textures;
-    let (alpha_mode, alpha, alpha_cutoff) = match material.alpha {
-        Alpha::Opaque => (OPAQUE, 1.0, 0.0),
-        Alpha::Mask { alpha, cutoff } => (MASK, alpha, cutoff),
-        Alpha::Blend { alpha } => (BLEND, alpha, 0.0),
-    };
-    let mut packed = Material {
-        base_color: material.base_color.to_array(),
-        surface,
-        emission: material.emission.to_array(),
-        ior: inside.ior,
-        flags: if material.back_emits { BACK_EMITS } else { 0 } | if material.back_hidden { BACK_HIDDEN } else { 0 },
-        metallic: gloss.metallic,
-        roughness: glass.map_or(gloss.roughness, |glass| glass.roughness),
-        transmission: inside.transmission,
-        specular_f0: gloss.specular_f0.to_array(),
-        specular_f90: gloss.specular_f90,
-        absorption: inside.absorption.to_array(),
-        thin: inside.thin.into(),
-        color_texture: textures.base_color.unwrap_or(NO_TEXTURE),
-        metal_texture: textures.metallic_roughness.unwrap_or(NO_TEXTURE),
-        normal_texture: textures.normal.map_or(NO_TEXTURE, |(texture, _)| texture),
-        emission_texture: textures.emission.unwrap_or(NO_TEXTURE),
-        transmission_texture: textures.transmission.unwrap_or(NO_TEXTURE),
-        specular_texture: textures.specular.unwrap_or(NO_TEXTURE),
-        specular_color_texture: textures.specular_color.unwrap_or(NO_TEXTURE),
-        normal_scale: textures.normal.map_or(0.0, |(_, scale)| scale),
-        alpha_mode,
-        alpha_cutoff,
-        alpha,
-        dispersion: inside.dispersion,
-        coat: material.coat.factor,
-        coat_roughness: material.coat.roughness,
-        coat_texture: textures.coat.unwrap_or(NO_TEXTURE),
-        coat_roughness_texture: textures.coat_roughness.unwrap_or(NO_TEXTURE),
-        coat_normal_texture: textures.coat_normal.map_or(NO_TEXTURE, |(texture, _)| texture),
-        coat_normal_scale: textures.coat_normal.map_or(0.0, |(_, scale)| scale),
-        padding0: 0,
-        padding1: 0,
-    };
-    if surface == DIELECTRIC && is_changed(&packed) {
-        packed.flags |= SPECULAR_CHANGED;
-    }
-    packed
-}
-
-/// Whether a dielectric reflects another part of the light than its index says: KHR_materials_specular.
-fn is_changed(glass: &Material) -> bool {
-    let textures = [glass.specular_texture, glass.specular_color_texture];
-    let of_ior = normal_reflectance(glass.ior);
-    let is_other = |f0: &f32| (f0 - of_ior).abs() > 1e-6 * of_ior;
-    textures != [NO_TEXTURE; 2] || glass.specular_f90 != 1.0 || glass.specular_f0.iter().any(is_other)
 }
 
 fn texture_corners(scene: &Scene, order: &[u32]) -> Vec<Corner> {

@@ -78,7 +78,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
         clustered_run: clustered_run(device.kind),
         splitting: scene.features.dielectric || scene.features.glossy,
         specular: scene.features.mirror || scene.features.dielectric,
-        glossy: scene.features.glossy,
+        lobes: scene.features.visible_lobes(),
         meshes: scene.object_grids.len() as u32,
         object_cells: scene.object_cells,
     }

@@ -9,7 +9,9 @@ use ppm_vk::internals::config::RenderConfig;
 use ppm_vk::internals::cpu::{self, SeenByKernels};
 use ppm_vk::internals::film::Image;
 use ppm_vk::internals::gpu::Device;
-use ppm_vk::internals::layout::{CAUSTIC, Gloss, NEAREST, NO_OBJECT, Photon, Settings, TextureLookup, VisiblePoint};
+use ppm_vk::internals::layout::{
+    CAUSTIC, NEAREST, NO_OBJECT, PackedBsdf, Photon, Settings, TextureLookup, VisiblePoint,
+};
 use ppm_vk::internals::packing::PackedScene;
 use ppm_vk::internals::pipeline::Renderer;
 use ppm_vk::internals::random::{PathKind, Random};
@@ -127,7 +129,7 @@ pub fn small() -> RenderConfig {
 /// Visible points of the device, and how they scatter; of no glossy scene the latter is empty.
 pub struct Seen {
     pub points: Vec<VisiblePoint>,
-    pub gloss: Vec<Gloss>,
+    pub bsdfs: Vec<PackedBsdf>,
 }
 
 impl Seen {
@@ -135,7 +137,7 @@ impl Seen {
     pub fn with<'a>(&'a self, radii2: &'a [f32]) -> SeenByKernels<'a> {
         SeenByKernels {
             points: &self.points,
-            gloss: &self.gloss,
+            bsdfs: &self.bsdfs,
             radii2,
         }
     }
@@ -191,8 +193,8 @@ impl Bench {
     pub fn seen(&mut self) -> Seen {
         Seen {
             points: self.download(BufferId::VisiblePoints),
-            gloss: if self.scene.features.glossy {
-                self.download(BufferId::GlossOf)
+            bsdfs: if self.scene.features.glossy {
+                self.download(BufferId::PackedBsdfs)
             } else {
                 Vec::new()
             },

@@ -40,7 +40,7 @@ fn assert_methods_agree(
 ) -> Vec<u32> {
     let seen = Seen {
         points: points.to_vec(),
-        gloss: Vec::new(),
+        bsdfs: Vec::new(),
     };
     assert_methods_agree_on(bench, case, &seen, statistics, photons)
 }
@@ -79,8 +79,8 @@ fn assert_methods_agree_on(
     let updated: Vec<_> = expected.iter().zip(statistics).enumerate().map(update).collect();
 
     bench.upload(BufferId::VisiblePoints, points);
-    if !seen.gloss.is_empty() {
-        bench.upload(BufferId::GlossOf, &seen.gloss);
+    if !seen.bsdfs.is_empty() {
+        bench.upload(BufferId::PackedBsdfs, &seen.bsdfs);
     }
     bench.upload(BufferId::Photons, photons);
     bench.upload(BufferId::PhotonCount, &[photons.len() as u32]);

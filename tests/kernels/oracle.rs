@@ -98,7 +98,7 @@ fn the_kd_tree_finds_what_testing_every_photon_finds() {
         let radii2 = vec![(radius * plain.radius()).powi(2); points.len()];
         let seen = SeenByKernels {
             points: &points,
-            gloss: &[],
+            bsdfs: &[],
             radii2: &radii2,
         };
         let found = cpu::gather_kd_tree(&seen, &photons);

@@ -91,7 +91,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     let radii2 = vec![0.01; 64];
     let seen = Seen {
         points,
-        gloss: Vec::new(),
+        bsdfs: Vec::new(),
     };
     let of_iteration = cpu::gather_naive(&seen.with(&radii2), &photons);
     for (expected, gathered) in expected.iter_mut().zip(&of_iteration) {

@@ -232,10 +232,10 @@ fn a_coat_lies_on_any_surface() {
     };
     let mirror = json!({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}});
     for material in [matte(json!({})), glass(json!({})), mirror.clone()] {
-        let coat = coat(material).coat;
+        let coat = coat(material).layers.coat;
         assert_eq!((coat.factor, coat.roughness), (0.5, 0.25));
     }
-    assert_eq!(loaded(mirror).coat.factor, 0.0);
+    assert_eq!(loaded(mirror).layers.coat.factor, 0.0);
     // What is Lambertian without a coat has the microfacets of none below it.
     match coat(matte(json!({}))).surface {
         Surface::Glossy(gloss) => assert_eq!((gloss.specular_f0, gloss.specular_f90), (Vec3::ZERO, 0.0)),

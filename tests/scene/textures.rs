@@ -62,7 +62,7 @@ fn one_image_is_stored_once_and_looked_up_as_each_slot_wants() {
         (textures.metallic_roughness, textures.transmission, textures.specular),
         (linear, linear, linear)
     );
-    assert_eq!(textures.normal, Some((1, 0.5)));
+    assert_eq!((textures.normal, textures.normal_scale), (Some(1), 0.5));
     assert_eq!((scene.textures.lookups.len(), scene.textures.texels.len()), (2, 2));
     assert_eq!(scene.textures.lookups[0].flags, SRGB);
 }

@@ -23,7 +23,7 @@ fn assert_gathers_agree(
 ) -> Vec<u32> {
     let seen = SeenByKernels {
         points,
-        gloss: &[],
+        bsdfs: &[],
         radii2,
     };
     let expected = cpu::gather_naive(&seen, photons);

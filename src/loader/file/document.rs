@@ -3,7 +3,7 @@
 //! The `gltf` crate's own reader is not used beyond its JSON types: its validation indexes accessors unchecked, treats
 //! `KHR_materials_volume` as unsupported, and rejects custom attributes that the format allows.
 
-use crate::loader::extensions::{QUANTIZATION, SUPPORTED};
+use crate::loader::extensions::{QUANTIZATION, is_supported};
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
@@ -118,7 +118,7 @@ fn parse(json: &[u8], warnings: &mut Warnings) -> Check<Root> {
     check_version(&json)?;
     let required = json.get("extensionsRequired").and_then(Value::as_array);
     for extension in required.into_iter().flatten().filter_map(Value::as_str) {
-        if !SUPPORTED.contains(&extension) {
+        if !is_supported(extension) {
             return Err(format!(
                 "requires the extension {}, which isn't supported; export the scene without it",
                 quote(extension)

@@ -7,10 +7,10 @@ use gltf_json::validation::Checked;
 
 use super::attributes::Attributes;
 use super::tangents::{MAX_AROUND, tangents};
-use crate::loader::clearcoat::Clearcoat;
 use crate::loader::diagnostic::{Check, Warnings, damaged};
 use crate::loader::file::accessor::Integers;
 use crate::loader::file::document::Document;
+use crate::loader::material::layers::tangent_set;
 
 /// A primitive with checked accessors; its indices and vertices are checked when they are read.
 pub(crate) struct Primitive<'a> {
@@ -95,7 +95,7 @@ impl<'a> Primitive<'a> {
         };
         if !opened.attributes.has_tangents()
             && opened.attributes.has_texcoords()
-            && let Some(set) = normal_texture_set(document, material)
+            && let Some(set) = document.root.materials.get(material).and_then(tangent_set)
         {
             let triangles = (0..opened.triangle_count()).map(|triangle| opened.triangle(triangle));
             opened.generated_tangents = tangents(&opened.attributes, triangles, set)?;
@@ -158,17 +158,4 @@ impl<'a> Primitive<'a> {
     fn sequence_length(&self) -> usize {
         self.indices.map_or(self.attributes.len(), |indices| indices.len())
     }
-}
-
-/// The set of texture coordinates that a material's normal texture is looked up by, or else that of its coat, if it has one.
-fn normal_texture_set(document: &Document, material: usize) -> Option<usize> {
-    let material = document.root.materials.get(material)?;
-    let of_coat = Clearcoat::of(material).and_then(|clearcoat| clearcoat.ok()?.clearcoat_normal_texture);
-    let texture = material.normal_texture.as_ref().or(of_coat.as_ref())?;
-    let extensions = texture.extensions.as_ref();
-    let transform = extensions.and_then(|extensions| extensions.others.get("KHR_texture_transform"));
-    let set = transform.and_then(|transform| transform.get("texCoord")?.as_u64());
-    usize::try_from(set.unwrap_or(texture.tex_coord.into()))
-        .ok()
-        .filter(|&set| set < 2)
 }

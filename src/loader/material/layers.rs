@@ -1,0 +1,93 @@
+//! Extensions of materials that the `gltf` crate doesn't know: each with its reader, what it checks, and its textures.
+
+use gltf_json::Material;
+use gltf_json::material::NormalTexture;
+use gltf_json::texture::Info;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use super::{Reader, linear, used_normals};
+use crate::loader::diagnostic::{Check, damaged};
+use crate::loader::texture::TextureUse;
+use crate::scene::{Coat, Layers, MaterialTextures};
+
+const CLEARCOAT: &str = "KHR_materials_clearcoat";
+
+/// Their names.
+pub(crate) const EXTENSIONS: &[&str] = &[CLEARCOAT];
+
+/// What a material says of its coat.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct Clearcoat {
+    clearcoat_factor: f32,
+    clearcoat_texture: Option<Info>,
+    clearcoat_roughness_factor: f32,
+    clearcoat_roughness_texture: Option<Info>,
+    clearcoat_normal_texture: Option<NormalTexture>,
+}
+
+/// An extension of a material; `None` where it has none.
+fn extension<T: DeserializeOwned>(material: &Material, name: &str) -> Check<Option<T>> {
+    let extensions = material.extensions.as_ref();
+    let Some(extension) = extensions.and_then(|extensions| extensions.others.get(name)) else {
+        return Ok(None);
+    };
+    let read = serde_json::from_value(extension.clone());
+    read.map(Some)
+        .map_err(|error| damaged(format_args!("its {name}: {error}")))
+}
+
+/// The texture whose coordinates tangents follow, of a material that needs some: its set, and its extensions.
+fn tangent_texture(material: &Material) -> Option<NormalTexture> {
+    let of_coat = || {
+        extension::<Clearcoat>(material, CLEARCOAT)
+            .ok()??
+            .clearcoat_normal_texture
+    };
+    material.normal_texture.clone().or_else(of_coat)
+}
+
+/// The set of texture coordinates that a material's tangents follow, if it needs some: that of its normal texture, or else of the
+/// coat's.
+pub(crate) fn tangent_set(material: &Material) -> Option<usize> {
+    let texture = tangent_texture(material)?;
+    let extensions = texture.extensions.as_ref();
+    let transform = extensions.and_then(|extensions| extensions.others.get("KHR_texture_transform"));
+    let set = transform.and_then(|transform| transform.get("texCoord")?.as_u64());
+    usize::try_from(set.unwrap_or(texture.tex_coord.into()))
+        .ok()
+        .filter(|&set| set < 2)
+}
+
+impl Reader<'_> {
+    pub(super) fn layers(&mut self) -> Check<Layers> {
+        Ok(Layers { coat: self.coat()? })
+    }
+
+    /// Their textures, and where those belong.
+    pub(super) fn layer_textures<'t>(
+        &self,
+        textures: &'t mut MaterialTextures,
+    ) -> Check<Vec<(&'t mut Option<u32>, Option<TextureUse>)>> {
+        let coat: Clearcoat = extension(self.json, CLEARCOAT)?.unwrap_or_default();
+        let coat_normal = coat.clearcoat_normal_texture.as_ref();
+        textures.coat_normal_scale = coat_normal.map_or(0.0, |texture| texture.scale);
+        let coat_normal = coat_normal.map(|texture| used_normals("clearcoatNormalTexture", texture));
+        Ok(vec![
+            (&mut textures.coat, coat.clearcoat_texture.as_ref().map(linear)),
+            (
+                &mut textures.coat_roughness,
+                coat.clearcoat_roughness_texture.as_ref().map(linear),
+            ),
+            (&mut textures.coat_normal, coat_normal.transpose()?),
+        ])
+    }
+
+    fn coat(&mut self) -> Check<Coat> {
+        let coat: Clearcoat = extension(self.json, CLEARCOAT)?.unwrap_or_default();
+        let [factor] = self.fractions("clearcoatFactor", [coat.clearcoat_factor])?;
+        let [roughness] = self.fractions("clearcoatRoughnessFactor", [coat.clearcoat_roughness_factor])?;
+        Ok(Coat { factor, roughness })
+    }
+}
