@@ -40,6 +40,8 @@ mod picture;
 mod prism;
 #[path = "right/references.rs"]
 mod references;
+#[path = "right/sheen.rs"]
+mod sheen;
 #[path = "right/soft.rs"]
 mod soft;
 #[path = "right/stage.rs"]

@@ -19,7 +19,7 @@ Material material_at(uint i) {
 
 Material no_material() {
     uvec4 zero = uvec4(0u);
-    return material_from(zero, zero, zero, zero, zero, zero, zero, zero, zero, zero);
+    return material_from(zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero);
 }
 
 bool is_mirror(Material material) {
@@ -67,7 +67,8 @@ Bsdf bsdf_of(Material material) {
         bsdf = Bsdf(material.base_color * (1.0 - material.metallic),
                     mix(material.specular_f0, material.base_color, material.metallic),
                     mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness,
-                    vec2(largest(material.specular_f0), material.specular_f90), material.coat);
+                    vec2(largest(material.specular_f0), material.specular_f90), material.coat,
+                    Sheen(material.sheen_color, material.sheen_roughness));
     }
     return bsdf;
 }
@@ -82,6 +83,7 @@ Material coat_of(Material material) {
     material.specular_f0 = vec3(COAT_F0 * coat);
     material.specular_f90 = coat;
     material.coat = 0.0;
+    material.sheen_color = vec3(0.0);
     return material;
 }
 
@@ -117,10 +119,13 @@ struct MaterialPoint {
     float coat;
     float coat_roughness;
     vec3 coat_normal;
+    vec3 sheen_color;
+    float sheen_roughness;
 };
 
 MaterialPoint material_point(Hit hit) {
-    MaterialPoint point = MaterialPoint(vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0), 1.0, 1.0, vec3(1.0), 1.0, 1.0, vec3(0.0));
+    MaterialPoint point = MaterialPoint(vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0), 1.0, 1.0, vec3(1.0), 1.0, 1.0, vec3(0.0),
+                                        vec3(1.0), 1.0);
     ShadingTriangle triangle = shading_triangle(hit.triangle);
     if (is_textured(triangle)) {
         vec4 sets = texture_coordinates(hit);
@@ -128,6 +133,9 @@ MaterialPoint material_point(Hit hit) {
         uint count = 7u;
         if (CLEARCOAT) {
             count = 10u;
+        }
+        if (SHEEN) {
+            count = 12u;
         }
         for (uint i = 0u; i < count; i++) {
             Material maps = material_at(triangle.material);
@@ -137,6 +145,14 @@ MaterialPoint material_point(Hit hit) {
             if (CLEARCOAT) {
                 uvec3 third = uvec3(maps.coat_texture, maps.coat_roughness_texture, maps.coat_normal_texture);
                 index = i < 7u ? index : third[min(i - 7u, 2u)];
+            }
+            if (SHEEN) {
+                uvec2 fourth = uvec2(maps.sheen_texture, maps.sheen_roughness_texture);
+                if (i >= 10u) {
+                    index = fourth[i - 10u];
+                } else if (i >= 7u) {
+                    index = CLEARCOAT ? index : NO_TEXTURE;
+                }
             }
             if (index != NO_TEXTURE) {
                 vec4 value = texture_value(index, sets);
@@ -159,8 +175,12 @@ MaterialPoint material_point(Hit hit) {
                     point.coat = value.r;
                 } else if (i == 8u) {
                     point.coat_roughness = value.g;
-                } else {
+                } else if (i == 9u) {
                     point.coat_normal = value.rgb;
+                } else if (i == 10u) {
+                    point.sheen_color = value.rgb;
+                } else {
+                    point.sheen_roughness = value.a;
                 }
             }
         }
@@ -183,6 +203,10 @@ Material textured_material(uint index, MaterialPoint point) {
         if (CLEARCOAT) {
             material.coat *= point.coat;
             material.coat_roughness *= point.coat_roughness;
+        }
+        if (SHEEN) {
+            material.sheen_color *= point.sheen_color;
+            material.sheen_roughness *= point.sheen_roughness;
         }
     }
     return material;

@@ -7,6 +7,44 @@
 #include "bsdf/microfacet.glsl"
 #include "bsdf/material_features.glsl"
 
+// Sheen: Estevez and Kulla's «Charlie» distribution (Production Friendly Microfacet Sheen BRDF, SIGGRAPH 2017) with Neubelt and
+// Pettineo's visibility, which is bounded here so that the weight of a cosine-distributed direction is: 51 at the most. Both are
+// functions of both directions, so that light may go either way.
+layout(constant_id = 33) const bool SHEEN = false;
+
+// Below that, the lobe is a few degrees wide.
+float sheen_roughness(float roughness) {
+    return max(roughness, 0.1);
+}
+
+// Its albedo at grazing incidence, of a white one: fitted to quadrature, to 0.006.
+float sheen_peak(float r) {
+    return 2.463 + r * (-8.00398151 + r * (14.34744501 + r * (-12.32805692 + r * 4.07491165)));
+}
+
+// Its value. What would reflect more than all light is scaled.
+float sheen_lobe(float roughness, float nv, float nl, vec3 n, vec3 h) {
+    float r = sheen_roughness(roughness);
+    float inverse = 1.0 / (r * r);
+    float sine = min(length(cross(n, h)), 1.0);
+    float distribution = (2.0 + inverse) * pow(sine, inverse) * (0.5 / PI);
+    float visibility = min(0.25 / max(nl + nv - nl * nv, 1e-6), 1.0);
+    return distribution * visibility / max(sheen_peak(r), 1.0);
+}
+
+// Its albedo at this cosine: fitted to quadrature, too high by 0.05 at the most and never too low.
+float sheen_albedo(float roughness, float cosine) {
+    float r = sheen_roughness(roughness);
+    float fall = pow(max(1.0 - cosine, 0.0), 0.84 / r + 0.4);
+    float rest = 0.02971007 + r * (-0.29507969 + r * (0.98345712 - r * 0.49700958));
+    return min(min(sheen_peak(r), 1.0) * mix(rest, 1.0, fall) + 0.024, 1.0);
+}
+
+struct Sheen {
+    vec3 color;
+    float roughness;
+};
+
 struct Bsdf {
     vec3 diffuse;   // albedo of the base
     vec3 f0;        // reflectance of the boundary at normal and at grazing incidence
@@ -14,10 +52,11 @@ struct Bsdf {
     float alpha;
     vec2 over_base; // largest channel of what reflects over the base, at normal and at grazing incidence
     float coat;     // what lies above both, see KHR_materials_clearcoat: how much of a dielectric's reflection it has
+    Sheen sheen;    // between
 };
 
 Bsdf lambertian(vec3 albedo) {
-    return Bsdf(albedo, vec3(0.0), 0.0, 0.0, vec2(0.0), 0.0);
+    return Bsdf(albedo, vec3(0.0), 0.0, 0.0, vec2(0.0), 0.0, Sheen(vec3(0.0), 0.0));
 }
 
 vec3 fresnel(Bsdf bsdf, float cosine) {
@@ -27,6 +66,19 @@ vec3 fresnel(Bsdf bsdf, float cosine) {
 // What gets through to the base, alike for all colours (KHR_materials_specular), and past what isn't metal alone.
 float through_to_base(Bsdf bsdf, float cosine) {
     return 1.0 - mix(bsdf.over_base.x, bsdf.over_base.y, schlick(cosine));
+}
+
+bool has_sheen(Bsdf bsdf) {
+    return SHEEN && largest(bsdf.sheen.color) > 0.0;
+}
+
+// What a sheen lets through to what lies below, alike for all colours (KHR_materials_sheen).
+float sheen_passes(Bsdf bsdf, float nv, float nl) {
+    float passes = 1.0;
+    if (has_sheen(bsdf)) {
+        passes = 1.0 - largest(bsdf.sheen.color) * sheen_albedo(bsdf.sheen.roughness, min(nv, nl));
+    }
+    return passes;
 }
 
 // Its value, 1/sr, without what a smooth boundary mirrors.
@@ -41,6 +93,9 @@ vec3 evaluate_bsdf(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
     float visibility = 0.5 / (nl * masking_root(alpha, nv) + nv * masking_root(alpha, nl));
     float lobe = bsdf.alpha < SMOOTH_ALPHA ? 0.0 : ggx(alpha, n, h) * visibility;
     vec3 value = through * bsdf.diffuse * (1.0 / PI) + f * lobe;
+    if (has_sheen(bsdf)) {
+        value = sheen_passes(bsdf, nv, nl) * value + bsdf.sheen.color * sheen_lobe(bsdf.sheen.roughness, nv, nl, n, h);
+    }
     return nv > 0.0 && nl > 0.0 ? coat_passes(bsdf.coat, cosine) * value : vec3(0.0);
 }
 
@@ -58,12 +113,18 @@ float reflection_probability(Bsdf bsdf, float nv) {
     vec3 f = fresnel(bsdf, nv);
     float reflected = max(f.r, max(f.g, f.b));
     float under = max(bsdf.diffuse.r, max(bsdf.diffuse.g, bsdf.diffuse.b)) * (1.0 - reflected);
+    if (has_sheen(bsdf)) {
+        float passes = sheen_passes(bsdf, nv, nv);
+        reflected *= passes;
+        under = passes * under + largest(bsdf.sheen.color) * sheen_albedo(bsdf.sheen.roughness, nv);
+    }
     return reflected <= 0.0 ? 0.0 : (under <= 0.0 ? 1.0 : max(reflected / (reflected + under), 0.25));
 }
 
 // The weight of what a smooth boundary mirrors, chosen with this probability.
 vec3 mirrored_part(Bsdf bsdf, float nv, float probability) {
-    return fresnel(bsdf, nv) * (coat_passes(bsdf.coat, nv) / probability);
+    vec3 mirrored = fresnel(bsdf, nv) * (coat_passes(bsdf.coat, nv) / probability);
+    return has_sheen(bsdf) ? sheen_passes(bsdf, nv, nv) * mirrored : mirrored;
 }
 
 // BRDF · cos / density of a direction from `reflected_direction`, or of a mirror's.
@@ -73,7 +134,8 @@ vec3 reflected_weight(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
     bool smooth_boundary = bsdf.alpha < SMOOTH_ALPHA;
     float vh = smooth_boundary ? nv : dot(v, normalize(v + l));
     float masking = smooth_boundary ? 1.0 : (nl > 0.0 ? joint_masking(bsdf.alpha, nv, nl) : 0.0);
-    return fresnel(bsdf, vh) * (coat_passes(bsdf.coat, vh) * masking);
+    vec3 weight = fresnel(bsdf, vh) * (coat_passes(bsdf.coat, vh) * masking);
+    return has_sheen(bsdf) ? sheen_passes(bsdf, nv, smooth_boundary ? nv : max(nl, 0.0)) * weight : weight;
 }
 
 // The reflection of a boundary that paths follow has been taken away from what a visible point shows.
@@ -84,13 +146,15 @@ Bsdf base_of(Bsdf bsdf) {
 
 // The value of its boundary alone.
 vec3 evaluate_boundary(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
+    float passes = sheen_passes(bsdf, dot(n, v), dot(n, l));
     bsdf.diffuse = vec3(0.0);
-    return evaluate_bsdf(bsdf, n, v, l);
+    bsdf.sheen.color = vec3(0.0);
+    return passes * evaluate_bsdf(bsdf, n, v, l);
 }
 
 // Whether it scatters anything that isn't followed.
 bool scatters(Bsdf bsdf) {
-    return largest(bsdf.diffuse) > 0.0 || bsdf.alpha > 0.0;
+    return largest(bsdf.diffuse) > 0.0 || bsdf.alpha > 0.0 || has_sheen(bsdf);
 }
 
 // A visible point's BSDF, towards its viewer. Where nothing but Lambertian surfaces is known its value is 1, since the visible
@@ -132,14 +196,25 @@ PackedBsdf pack_bsdf(Bsdf bsdf, vec3 viewer, bool coated) {
         PackedBsdf packed = pack_bsdf(bsdf, viewer, coated);                                                                       \
         buffer[2u * (slot)] = floatBitsToUint(packed.diffuse_viewer);                                                              \
         buffer[2u * (slot) + 1u] = packed.rest;                                                                                    \
+        if (SHEEN) {                                                                                                               \
+            buffer[2u * slots() + (slot)] = pack_layers(bsdf);                                                                     \
+        }                                                                                                                          \
     }
-#define LOAD_BSDF(buffer, slot, normal) unpack_bsdf(PACKED_BSDF(buffer, slot), normal)
+#define LOAD_BSDF(buffer, slot, normal) \
+    unpack_bsdf(PACKED_BSDF(buffer, slot), SHEEN ? TEXEL_BITS(buffer, 2u * slots() + (slot)) : uvec4(0u), normal)
 
-VisibleBsdf unpack_bsdf(PackedBsdf packed, vec3 normal) {
+// A PackedLayers.
+uvec4 pack_layers(Bsdf bsdf) {
+    return uvec4(packHalf2x16(bsdf.sheen.color.rg), packHalf2x16(vec2(bsdf.sheen.color.b, bsdf.sheen.roughness)), 0u, 0u);
+}
+
+VisibleBsdf unpack_bsdf(PackedBsdf packed, uvec4 layers, vec3 normal) {
+    vec2 sheen = unpackHalf2x16(layers.y);
     vec2 f0_b_f90 = unpackHalf2x16(packed.rest.y);
     vec2 alpha_coat = unpackHalf2x16(packed.rest.z);
     Bsdf bsdf = Bsdf(packed.diffuse_viewer.rgb, vec3(unpackHalf2x16(packed.rest.x), f0_b_f90.x), f0_b_f90.y,
-                     abs(alpha_coat.x), unpackHalf2x16(packed.rest.w), alpha_coat.y);
+                     abs(alpha_coat.x), unpackHalf2x16(packed.rest.w), alpha_coat.y,
+                     Sheen(vec3(unpackHalf2x16(layers.x), sheen.x), sheen.y));
     return VisibleBsdf(normal, decode_direction(floatBitsToUint(packed.diffuse_viewer.w)), bsdf,
                        (packed.rest.z & COATED) != 0u);
 }

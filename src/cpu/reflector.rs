@@ -15,6 +15,65 @@ pub(super) fn schlick(cosine: f64) -> f64 {
     (1.0 - cosine).clamp(0.0, 1.0).powi(5)
 }
 
+/// `KHR_materials_sheen`; `glsl/bsdf/reflection.glsl` cites the sources.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sheen {
+    /// Black for none.
+    pub color: DVec3,
+    /// The largest channel of what covers the rest.
+    pub covers: f64,
+    /// Its square is the Charlie distribution's α.
+    pub roughness: f64,
+}
+
+impl Sheen {
+    /// Of this color.
+    pub fn new(color: DVec3, roughness: f64) -> Self {
+        Self {
+            color,
+            covers: color.max_element(),
+            roughness,
+        }
+    }
+
+    fn roughness(&self) -> f64 {
+        self.roughness.max(0.1)
+    }
+
+    /// Albedo of a white one at grazing incidence.
+    fn peak(&self) -> f64 {
+        let r = self.roughness();
+        2.463 + r * (-8.003_981_51 + r * (14.347_445_01 + r * (-12.328_056_92 + r * 4.074_911_65)))
+    }
+
+    /// Its value, 1/sr.
+    pub fn brdf(&self, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
+        let (nv, nl) = (n.dot(v), n.dot(l));
+        let inverse = self.roughness().powi(-2);
+        let sine = n.cross((v + l).normalize()).length().min(1.0);
+        let distribution = (2.0 + inverse) * sine.powf(inverse) * (0.5 / PI);
+        let visibility = (0.25 / (nl + nv - nl * nv).max(1e-6)).min(1.0);
+        self.color * distribution * visibility / self.peak().max(1.0)
+    }
+
+    /// Albedo of a white one, never too low.
+    pub fn albedo(&self, cosine: f64) -> f64 {
+        let r = self.roughness();
+        let fall = (1.0 - cosine).max(0.0).powf(0.84 / r + 0.4);
+        let rest = 0.029_710_07 + r * (-0.295_079_69 + r * (0.983_457_12 - r * 0.497_009_58));
+        (self.peak().min(1.0) * (rest + (1.0 - rest) * fall) + 0.024).min(1.0)
+    }
+
+    /// What it lets through to what lies below.
+    pub fn passes(&self, nv: f64, nl: f64) -> f64 {
+        if self.covers > 0.0 {
+            1.0 - self.covers * self.albedo(nv.min(nl))
+        } else {
+            1.0
+        }
+    }
+}
+
 /// A Lambertian base under a boundary of microfacets. `v` and `l` are unit vectors to the viewer and to the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reflector {
@@ -30,6 +89,8 @@ pub struct Reflector {
     pub alpha: f64,
     /// What lies above both: how much of a dielectric's reflection it has.
     pub coat: f64,
+    /// Between.
+    pub sheen: Sheen,
 }
 
 /// What a coat lets through to what lies below.
@@ -47,6 +108,7 @@ impl Reflector {
             over_base: [0.0; 2],
             alpha: 0.0,
             coat: 0.0,
+            sheen: Sheen::default(),
         }
     }
 
@@ -73,6 +135,7 @@ impl Reflector {
             ],
             alpha: f64::from(material.roughness).powi(2),
             coat: f64::from(material.coat),
+            sheen: Sheen::new(rgb(material.sheen_color), material.sheen_roughness.into()),
         }
     }
 
@@ -95,7 +158,7 @@ impl Reflector {
         }
     }
 
-    /// What a visible point of the kernels keeps, the direction to the viewer, and whether the material is coated.
+    /// What a visible point of the kernels keeps of a scene without sheen, the direction to the viewer, and whether the material is coated.
     pub(super) fn of_packed(packed: &PackedBsdf) -> (Self, DVec3, bool) {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
         let [f0_rg, f0_b_f90, alpha_coat, over_base] = packed.rest.map(|word| [half(word), half(word >> 16)]);
@@ -106,6 +169,7 @@ impl Reflector {
             over_base,
             alpha: alpha_coat[0].abs(),
             coat: alpha_coat[1],
+            sheen: Sheen::default(),
         };
         let viewer = decode_direction(word(packed.diffuse_viewer));
         (reflector, viewer, packed.rest[2] & COATED != 0)
@@ -113,13 +177,17 @@ impl Reflector {
 
     /// Albedo of the base in the strongest channel, as far as it chooses among lobes.
     pub(super) fn base_albedo(&self) -> f64 {
-        self.diffuse.max_element()
+        self.diffuse.max_element().max(self.sheen.color.max_element())
     }
 
-    /// The same without its base.
+    /// The same without its base and its sheen, which both still take their part.
     pub fn boundary(self) -> Self {
         Self {
             diffuse: DVec3::ZERO,
+            sheen: Sheen {
+                color: DVec3::ZERO,
+                ..self.sheen
+            },
             ..self
         }
     }
@@ -164,13 +232,19 @@ impl Reflector {
             let visibility = 0.5 / (nl * self.masking_root(nv) + nv * self.masking_root(nl));
             self.fresnel(v.dot(h)) * self.ggx(n, h) * visibility
         };
-        coat_passes(self.coat, v.dot(h)) * (base + lobe)
+        let below = (base + lobe) * self.sheen.passes(nv, nl);
+        coat_passes(self.coat, v.dot(h)) * (below + self.sheen.brdf(n, v, l))
     }
 
     /// Share of the samples that go to the boundary's reflection.
     pub fn reflection_probability(&self, nv: f64) -> f64 {
-        let reflected = self.fresnel(nv).max_element();
-        let under = self.diffuse.max_element() * (1.0 - reflected);
+        let mut reflected = self.fresnel(nv).max_element();
+        let mut under = self.diffuse.max_element() * (1.0 - reflected);
+        if self.sheen.covers > 0.0 {
+            let passes = self.sheen.passes(nv, nv);
+            reflected *= passes;
+            under = passes * under + self.sheen.color.max_element() * self.sheen.albedo(nv);
+        }
         if reflected <= 0.0 {
             0.0
         } else if under <= 0.0 {
@@ -219,12 +293,12 @@ impl Reflector {
     pub fn reflected_weight(&self, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
         let (nv, nl) = (n.dot(v), n.dot(l));
         if self.is_smooth() {
-            return self.fresnel(nv) * coat_passes(self.coat, nv);
+            return self.fresnel(nv) * coat_passes(self.coat, nv) * self.sheen.passes(nv, nv);
         }
         if nl <= 0.0 {
             return DVec3::ZERO;
         }
         let vh = v.dot((v + l).normalize());
-        self.fresnel(vh) * coat_passes(self.coat, vh) * self.joint_masking(nv, nl)
+        self.fresnel(vh) * coat_passes(self.coat, vh) * self.joint_masking(nv, nl) * self.sheen.passes(nv, nl)
     }
 }

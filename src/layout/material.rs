@@ -8,7 +8,7 @@ use super::shape::{FieldLayout, Layout, Shared};
 
 device_structs! {
     /// A material. Textures are indices of [`TextureLookup`]s, or [`NO_TEXTURE`]; each is a factor.
-    pub struct Material: 160 {
+    pub struct Material: 176 {
         /// Linear RGB albedo, reflectance or tint.
         pub base_color: [f32; 3],
         /// [`MATTE`], [`MIRROR`], [`DIELECTRIC`] or [`GLOSSY_SURFACE`].
@@ -69,10 +69,14 @@ device_structs! {
         pub coat_normal_texture: u32,
         /// How far those lean.
         pub coat_normal_scale: f32,
-        /// Zero.
-        pub padding0: u32,
-        /// Zero.
-        pub padding1: u32,
+        /// Roughness of the sheen; its square is the Charlie distribution's α.
+        pub sheen_roughness: f32,
+        /// Of the sheen's roughness, in alpha.
+        pub sheen_roughness_texture: u32,
+        /// Reflectance of the sheen, linear RGB; black: none.
+        pub sheen_color: [f32; 3],
+        /// Of that.
+        pub sheen_texture: u32,
     }
 
     /// How a visible point's surface scatters, where the scene has glossy ones.
@@ -84,18 +88,29 @@ device_structs! {
         /// the base at both angles. α's sign: whether the material is coated.
         pub rest: [u32; 4],
     }
+
+    /// What else lies above it, where the scene has such; those of all slots follow the [`PackedBsdf`]s of all.
+    pub struct PackedLayers: 16 {
+        /// f16s, two to a word: the sheen's reflectance, linear RGB, and its roughness.
+        pub sheen: [u32; 2],
+        /// Zero.
+        pub padding0: u32,
+        /// Zero.
+        pub padding1: u32,
+    }
 }
 
 /// What a visible point's BSDF can have beside a Lambertian lobe: constants of what makes visible points and gathers for them.
-pub const VISIBLE_LOBES: [&str; 1] = ["GLOSSY"];
+pub const VISIBLE_LOBES: [&str; 2] = ["GLOSSY", "SHEEN"];
 
 /// Which of [`VISIBLE_LOBES`] there are.
 pub type VisibleLobes = [bool; VISIBLE_LOBES.len()];
 
 /// Texels that a visible point needs for these.
 pub fn packed_bsdf_texels(lobes: VisibleLobes) -> u64 {
-    let [glossy] = lobes;
-    if glossy { size_of::<PackedBsdf>() as u64 / 16 } else { 0 }
+    let [glossy, layered] = lobes;
+    let of = |present, bytes: usize| if present { bytes as u64 / 16 } else { 0 };
+    of(glossy, size_of::<PackedBsdf>()) + of(layered, size_of::<PackedLayers>())
 }
 
 /// What a texture multiplies in [`Material`]: a channel each.
@@ -136,4 +151,6 @@ texture_factors! {
     specular_color_texture: specular_f0 * RGB,
     coat_texture: coat * &[0],
     coat_roughness_texture: coat_roughness * &[1],
+    sheen_texture: sheen_color * RGB,
+    sheen_roughness_texture: sheen_roughness * &[3],
 }

@@ -76,6 +76,15 @@ pub struct Coat {
     pub roughness: f32,
 }
 
+/// KHR_materials_sheen: fibres that stand off the surface, below a coat.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sheen {
+    /// Linear RGB, 0 ..= 1; black for none.
+    pub color: Vec3,
+    /// 0 ..= 1.
+    pub roughness: f32,
+}
+
 /// Where a surface is there at all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Alpha {
@@ -100,17 +109,19 @@ pub enum Alpha {
 pub struct Layers {
     /// The topmost.
     pub coat: Coat,
+    /// Below it.
+    pub sheen: Sheen,
 }
 
 impl Layers {
     /// Whether a surface with these has more than a Lambertian lobe or a mirror's.
     pub fn are_glossy(&self) -> bool {
-        self.coat.factor > 0.0
+        self.coat.factor > 0.0 || self.sheen.color != Vec3::ZERO
     }
 
     /// Whether it is more than a mirror, which may have a coat.
     pub fn hide_mirrors(&self) -> bool {
-        false
+        self.sheen.color != Vec3::ZERO
     }
 }
 
@@ -163,6 +174,10 @@ material_textures! {
     coat_roughness: coat_roughness_texture,
     /// Its normals.
     coat_normal: coat_normal_texture,
+    /// Reflectance of the sheen.
+    sheen: sheen_texture,
+    /// Its roughness, in alpha.
+    sheen_roughness: sheen_roughness_texture,
 }
 
 /// A glTF material, reduced to what is supported.
@@ -225,6 +240,8 @@ impl Material {
             dispersion: inside.dispersion,
             coat: self.layers.coat.factor,
             coat_roughness: self.layers.coat.roughness,
+            sheen_color: self.layers.sheen.color.to_array(),
+            sheen_roughness: self.layers.sheen.roughness,
             ..bytemuck::Zeroable::zeroed()
         };
         self.textures.pack(&mut record);
@@ -272,6 +289,8 @@ macro_rules! material_features {
             specular_glass: "SPECULAR_GLASS" = |it| it.flags & $crate::layout::SPECULAR_CHANGED != 0,
             /// Clear coats.
             coat: "CLEARCOAT" = |it| it.coat > 0.0,
+            /// Sheens.
+            sheen: "SHEEN" = |it| it.sheen_color != [0.0; 3],
             /// Surfaces whose back no camera sees.
             culling: "CULLING" = |it| it.flags & $crate::layout::BACK_HIDDEN != 0,
             $($rest)*

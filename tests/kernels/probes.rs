@@ -210,6 +210,8 @@ fn bsdfs(count: u32) -> Vec<AskedBsdf> {
             dispersion: n[4][3] * f32::from(u8::from(i % 5 == 0)),
             coat: n[5][0] * f32::from(u8::from(i % 2 == 0)),
             coat_roughness: [0.0, 0.1, 0.5][i % 3],
+            sheen_color: [n[5][3], n[4][1], n[3][2]].map(|value| value * f32::from(u8::from(i % 3 == 1))),
+            sheen_roughness: n[1][1],
             color_texture: NO_TEXTURE,
             ..Material::zeroed()
         };
@@ -269,6 +271,10 @@ impl Case {
         let n = self.normals.shading;
         let alpha = f64::from(self.material.roughness).powi(2).max(SMOOTH_ALPHA);
         let narrow = 1.0 / (alpha * (self.v + l).length().max(1e-6));
+        // The sheen's power of a sine: its rounding grows with the exponent.
+        let has_sheen = self.material.sheen_color != [0.0; 3];
+        let sheen = f64::from(self.material.sheen_roughness).max(0.1).powi(-2);
+        let narrow = narrow + if has_sheen { sheen } else { 0.0 };
         2e-6 * (2.0 + narrow + 1.0 / n.dot(self.v).abs().max(1e-9) + 1.0 / n.dot(l).abs().max(1e-9))
     }
 }

@@ -15,7 +15,7 @@ use crate::stage::{camera_ray, subject};
 
 const SIDE: usize = 32;
 
-fn with_extension(mut material: Value, name: &str, extension: Value) -> Value {
+pub fn with_extension(mut material: Value, name: &str, extension: Value) -> Value {
     material["extensions"][name] = extension;
     material
 }
@@ -37,7 +37,7 @@ fn schlick(cosine: f64) -> f64 {
 
 /// The radiance of a plate of this material in a room whose walls all have radiance 1, as a function of the cosine to the
 /// viewer.
-fn assert_plate_shows(
+pub fn assert_plate_shows(
     material: impl FnOnce(&mut Document) -> Value,
     direct: Direct,
     photons: u32,
@@ -104,6 +104,7 @@ fn a_coated_plate_in_uniform_light_shows_its_coat_and_its_base() {
         over_base: [0.0; 2],
         alpha: 1.0,
         coat: 0.0,
+        sheen: Default::default(),
     };
     let nothing = json!({"specularFactor": 0});
     let black_material = with_extension(matte("black", [0.0; 3]), "KHR_materials_specular", nothing);
@@ -122,6 +123,7 @@ fn a_coated_plate_in_uniform_light_shows_its_coat_and_its_base() {
             over_base: [0.0; 2],
             alpha: roughness * roughness,
             coat: 0.0,
+            sheen: Default::default(),
         };
         let below = Reflector { coat: factor, ..base };
         for direct in [Direct::Light, Direct::Photons] {
@@ -179,6 +181,7 @@ fn the_normals_of_the_base_change_nothing_of_a_rough_coat() {
         over_base: [0.0; 2],
         alpha: 0.36,
         coat: 0.0,
+        sheen: Default::default(),
     };
     for direct in [Direct::Light, Direct::Photons] {
         for lean in [0.0, 45_f64.to_radians()] {

@@ -24,6 +24,7 @@ pub fn metal(alpha: f64) -> Reflector {
         over_base: [0.0; 2],
         alpha,
         coat: 0.0,
+        sheen: Default::default(),
     }
 }
 
@@ -35,6 +36,7 @@ pub fn plastic(alpha: f64) -> Reflector {
         over_base: [0.04, 1.0],
         alpha,
         coat: 0.0,
+        sheen: Default::default(),
     }
 }
 
@@ -136,10 +138,7 @@ pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
         alpha: 0.0,
         ..reflector
     };
-    let mirrors = Reflector {
-        diffuse: DVec3::ZERO,
-        ..reflector
-    };
+    let mirrors = reflector.boundary();
     let mut sum = DVec3::ZERO;
     for i in 0..steps * steps {
         let (s, turn) = (at(i / steps), at(i % steps));
@@ -252,6 +251,7 @@ fn a_base_lies_under_the_largest_channel_of_what_is_no_metal() {
         over_base: [0.24, specular],
         alpha: 0.0,
         coat: 0.0,
+        sheen: Default::default(),
     };
     for cosine in COSINES {
         let l = dvec3(-viewer(cosine).x, 0.0, cosine);

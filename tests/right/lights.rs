@@ -113,6 +113,7 @@ fn polished_metal_shows_the_highlight_of_a_point() {
         f90: 1.0,
         over_base: [0.0; 2],
         coat: 0.0,
+        sheen: Default::default(),
         alpha: ROUGHNESS * ROUGHNESS,
     };
     let sun = DVec3::new(0.0, 0.8_f64.sin(), 0.8_f64.cos());

@@ -235,6 +235,7 @@ fn polished_metal_shows_the_highlight_of_a_ball_once() {
         f90: 1.0,
         over_base: [0.0; 2],
         coat: 0.0,
+        sheen: Default::default(),
         alpha: ROUGHNESS * ROUGHNESS,
     };
     let region = Region::around([24, 24], 16);

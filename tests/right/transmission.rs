@@ -150,6 +150,7 @@ fn a_surface_that_is_half_clear_scatters_the_other_half() {
         over_base: [0.04, 1.0],
         alpha: 0.0,
         coat: 0.0,
+        sheen: Default::default(),
     };
     for direct in [Direct::Light, Direct::Photons] {
         measured_and_expected(&subject, direct, |cosine| {

@@ -223,6 +223,43 @@ fn metal_that_claims_to_be_glass_is_named_in_a_warning() {
     floor_of(metal_glass).assert_warns(&["material 0 \"floor\"", "metallicFactor 1", "transmission"]);
 }
 
+fn with_sheen(mut material: Value, sheen: Value) -> Value {
+    material["extensions"]["KHR_materials_sheen"] = sheen;
+    material
+}
+
+#[test]
+fn a_sheen_is_what_the_file_says() {
+    let sheen = json!({"sheenColorFactor": [0.25, 0.5, 1], "sheenRoughnessFactor": 0.75});
+    let mirror = json!({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}});
+    for material in [matte(json!({})), mirror] {
+        let material = loaded(with_sheen(material, sheen.clone()));
+        assert!(matches!(material.surface, Surface::Glossy(_)), "{:?}", material.surface);
+        let sheen = material.layers.sheen;
+        assert_eq!((sheen.color, sheen.roughness), (Vec3::new(0.25, 0.5, 1.0), 0.75));
+    }
+    // Its colour is black unless the file gives one.
+    let none = loaded(with_sheen(matte(json!({})), json!({"sheenRoughnessFactor": 0.5})));
+    assert_eq!(none.surface, Surface::Matte);
+}
+
+#[test]
+fn sheens_that_cannot_be_are_refused_or_told_of() {
+    let refused = [
+        (json!({"sheenColorFactor": [0, -1, 0]}), "sheenColorFactor is 0 -1 0"),
+        (json!({"sheenRoughnessFactor": -1}), "sheenRoughnessFactor is -1"),
+        (json!({"sheenColorFactor": 1}), "KHR_materials_sheen"),
+    ];
+    for (sheen, what) in refused {
+        floor_of(with_sheen(matte(json!({})), sheen)).assert_fails(&["material 0", what]);
+    }
+    let bright = json!({"sheenColorFactor": [2, 0, 0]});
+    floor_of(with_sheen(matte(json!({})), bright)).assert_warns(&["sheenColorFactor 2 0 0 is above 1"]);
+    let on_glass = glass(json!({}));
+    floor_of(with_sheen(on_glass, json!({"sheenColorFactor": [1, 0, 0]})))
+        .assert_warns(&["its sheen", "passes no light"]);
+}
+
 #[test]
 fn a_coat_lies_on_any_surface() {
     let coat = |mut material: Value| {

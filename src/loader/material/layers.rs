@@ -6,15 +6,16 @@ use gltf_json::texture::Info;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::{Reader, linear, used_normals};
+use super::{Reader, color, linear, used_normals};
 use crate::loader::diagnostic::{Check, damaged};
 use crate::loader::texture::TextureUse;
-use crate::scene::{Coat, Layers, MaterialTextures};
+use crate::scene::{Coat, Layers, MaterialTextures, Sheen};
 
 const CLEARCOAT: &str = "KHR_materials_clearcoat";
+const SHEEN: &str = "KHR_materials_sheen";
 
 /// Their names.
-pub(crate) const EXTENSIONS: &[&str] = &[CLEARCOAT];
+pub(crate) const EXTENSIONS: &[&str] = &[CLEARCOAT, SHEEN];
 
 /// What a material says of its coat.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -25,6 +26,16 @@ struct Clearcoat {
     clearcoat_roughness_factor: f32,
     clearcoat_roughness_texture: Option<Info>,
     clearcoat_normal_texture: Option<NormalTexture>,
+}
+
+/// What it says of its sheen.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct SheenExtension {
+    sheen_color_factor: [f32; 3],
+    sheen_color_texture: Option<Info>,
+    sheen_roughness_factor: f32,
+    sheen_roughness_texture: Option<Info>,
 }
 
 /// An extension of a material; `None` where it has none.
@@ -62,7 +73,10 @@ pub(crate) fn tangent_set(material: &Material) -> Option<usize> {
 
 impl Reader<'_> {
     pub(super) fn layers(&mut self) -> Check<Layers> {
-        Ok(Layers { coat: self.coat()? })
+        Ok(Layers {
+            coat: self.coat()?,
+            sheen: self.sheen()?,
+        })
     }
 
     /// Their textures, and where those belong.
@@ -71,6 +85,7 @@ impl Reader<'_> {
         textures: &'t mut MaterialTextures,
     ) -> Check<Vec<(&'t mut Option<u32>, Option<TextureUse>)>> {
         let coat: Clearcoat = extension(self.json, CLEARCOAT)?.unwrap_or_default();
+        let sheen: SheenExtension = extension(self.json, SHEEN)?.unwrap_or_default();
         let coat_normal = coat.clearcoat_normal_texture.as_ref();
         textures.coat_normal_scale = coat_normal.map_or(0.0, |texture| texture.scale);
         let coat_normal = coat_normal.map(|texture| used_normals("clearcoatNormalTexture", texture));
@@ -81,6 +96,11 @@ impl Reader<'_> {
                 coat.clearcoat_roughness_texture.as_ref().map(linear),
             ),
             (&mut textures.coat_normal, coat_normal.transpose()?),
+            (&mut textures.sheen, sheen.sheen_color_texture.as_ref().map(color)),
+            (
+                &mut textures.sheen_roughness,
+                sheen.sheen_roughness_texture.as_ref().map(linear),
+            ),
         ])
     }
 
@@ -89,5 +109,22 @@ impl Reader<'_> {
         let [factor] = self.fractions("clearcoatFactor", [coat.clearcoat_factor])?;
         let [roughness] = self.fractions("clearcoatRoughnessFactor", [coat.clearcoat_roughness_factor])?;
         Ok(Coat { factor, roughness })
+    }
+
+    fn sheen(&mut self) -> Check<Sheen> {
+        let sheen: SheenExtension = extension(self.json, SHEEN)?.unwrap_or_default();
+        let color = self.fractions("sheenColorFactor", sheen.sheen_color_factor)?;
+        let [roughness] = self.fractions("sheenRoughnessFactor", [sheen.sheen_roughness_factor])?;
+        let transmits = self.extension(|extensions| extensions.transmission.as_ref());
+        if color != [0.0; 3] && transmits.is_some_and(|it| it.transmission_factor.0 > 0.0) {
+            self.warn(
+                "its sheen lies on the part of it alone that passes no light, which looks darker at grazing angles"
+                    .into(),
+            );
+        }
+        Ok(Sheen {
+            color: color.into(),
+            roughness,
+        })
     }
 }
