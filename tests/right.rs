@@ -27,6 +27,8 @@ mod glass;
 mod gloss;
 #[path = "right/lamp.rs"]
 mod lamp;
+#[path = "right/leaning.rs"]
+mod leaning;
 #[path = "right/lights.rs"]
 mod lights;
 #[path = "right/measure.rs"]

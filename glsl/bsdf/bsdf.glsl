@@ -137,10 +137,16 @@ bool has_coat(uint material) {
     return is_coated(material_at(material));
 }
 
-// A photon's flux is per area of the surface; the shading normal's cosine replaces the geometric one's: Veach, «Robust Monte
-// Carlo Methods for Light Transport Simulation», 1997, section 5.3.
+// Photons are scattered as camera paths see it, by the adjoint BSDF: with a shading normal it isn't symmetric. Veach, «Robust
+// Monte Carlo Methods for Light Transport Simulation», 1997, section 5.3. The factor has two parts. Where a photon lands, flux is
+// per area of the surface; the shading normal's cosine replaces the geometric one's.
 float landing_correction(ShadingFrame frame, vec3 incoming) {
     return dot(incoming, frame.shading_normal) / dot(incoming, frame.geometric_normal);
+}
+
+// Where it leaves, the other way round. `cosine`: to the shading normal.
+float leaving_correction(ShadingFrame frame, vec3 outgoing, float cosine) {
+    return abs(dot(outgoing, frame.geometric_normal)) / max(abs(cosine), 1e-6);
 }
 
 // The factor of a photon's flux as it is kept. Of coated surfaces it is that across the ray: a coat has another shading normal
@@ -154,7 +160,7 @@ float kept_factor(SurfaceInteraction met, vec3 incoming) {
 }
 
 // Where a glossy surface scatters a photon to that comes from v, instead of the cosine-distributed `outgoing` or as that says,
-// and the part of the flux that goes there. Chosen by u.w, drawn by u.xy.
+// and the part of the flux that goes there, without the correction where it lands. Chosen by u.w, drawn by u.xy.
 vec3 scatter(Bsdf bsdf, ShadingFrame frame, vec3 v, vec4 u, inout vec3 outgoing) {
     vec3 n = frame.shading_normal;
     float nv = dot(n, v);
@@ -170,7 +176,8 @@ vec3 scatter(Bsdf bsdf, ShadingFrame frame, vec3 v, vec4 u, inout vec3 outgoing)
     float cosine = max(dot(outgoing, frame.geometric_normal), 0.0);
     float density = mix(cosine * (1.0 / PI), reflected_density(bsdf, n, v, outgoing), p);
     float over_density = is_smooth ? PI / (1.0 - p) : cosine / max(density, 1e-20);
-    vec3 mirrored = mirrored_part(bsdf, nv, p);
+    // The cosines of a mirror direction to the shading normal are equal.
+    vec3 mirrored = mirrored_part(bsdf, nv, p) * leaving_correction(frame, outgoing, nv);
     return is_smooth && reflects ? mirrored : evaluate_bsdf(bsdf, n, v, outgoing) * over_density;
 }
 
@@ -202,13 +209,14 @@ BsdfSample sample_bsdf(inout SurfaceInteraction met, vec3 incoming, vec4 u, inou
         if (is_glossy(met.material)) {
             way.weight = scatter(bsdf_of(met.material), met.frame, -incoming, u, way.direction);
         }
-        way.weight *= factor * landing_correction(met.frame, incoming);
+        way.weight *= factor;
     } else if (is_mirror(met.material)) {
         if (is_coated(met.material)) {
             factor *= coat_passes(met.material.coat, cosine);
         }
-        way.weight = factor * fresnel_schlick(met.material.base_color, cosine);
         way.direction = mirror_direction(met.frame, incoming);
+        way.weight = fresnel_schlick(met.material.base_color, cosine) *
+                     (factor * leaving_correction(met.frame, way.direction, cosine));
     } else if (DIELECTRICS) {
         if (DISPERSION) {
             way.color = disperse(met.material, wavelength, random);
@@ -216,9 +224,13 @@ BsdfSample sample_bsdf(inout SurfaceInteraction met, vec3 incoming, vec4 u, inou
         Boundary boundary = sample_dielectric(met.frame, incoming, met.material, met.outside, u.yw);
         way.at_boundary = true;
         way.transmitted = u.x >= boundary.reflectance;
-        way.weight = factor * (way.transmitted ? met.tint * boundary.refracted_weight : boundary.reflected_weight);
+        way.weight = way.transmitted ? met.tint * boundary.refracted_weight : boundary.reflected_weight;
         way.direction = way.transmitted ? boundary.refracted : boundary.reflected;
+        bool mirrors = !way.transmitted && !is_rough_glass(met.material);
+        float leaving = mirrors ? cosine : dot(way.direction, met.frame.shading_normal);
+        way.weight *= factor * leaving_correction(met.frame, way.direction, leaving);
     }
+    way.weight *= landing_correction(met.frame, incoming);
     return way;
 }
 

@@ -73,8 +73,8 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
             flux *= color;
         }
         let (v, bsdf) = (-incoming, met.bsdf(wavelength));
-        // Flux is per area of the geometric surface: Veach, «Robust Monte Carlo Methods for Light Transport Simulation», 1997,
-        // section 5.3.
+        // The adjoint BSDF, since flux is per area of the geometric surface: Veach, «Robust Monte Carlo Methods for Light Transport
+        // Simulation», 1997, section 5.3.
         let arriving = |normal: DVec3| v.dot(normal) / v.dot(met.normals.geometric);
         if bsdf.is_receiver() && !(samples_lights && is_direct) {
             // What is there in part is seen in part as well as met in part.
@@ -87,15 +87,20 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
                 flux_direction: with_word(landing, encode_direction(incoming)),
             });
         }
-        let [u, v, choice, survival] = random.next4();
-        let branches = bsdf.branches(-incoming, [u, v]);
+        let [place, turn, choice, survival] = random.next4();
+        let branches = bsdf.branches(v, [place, turn]);
         let Some(branch) = choose(&branches, choice) else {
             return Ending::Absorbed;
         };
         let mut scattered = flux * branch.weight / branch.probability;
-        if !branch.is_delta && branch.passes.is_none() && bsdf.is_receiver() {
-            let leaving = branch.direction.dot(met.normals.geometric) / branch.direction.dot(branch.normal);
-            scattered *= arriving(branch.normal) * if scattered == DVec3::ZERO { 0.0 } else { leaving };
+        if scattered != DVec3::ZERO {
+            // A mirror's cosines to the shading normal are one.
+            let is_mirrored = branch.is_delta && branch.passes.is_none();
+            let of_shading = if is_mirrored { v } else { branch.direction }
+                .dot(branch.normal)
+                .abs()
+                .max(1e-6);
+            scattered *= arriving(branch.normal) * branch.direction.dot(met.normals.geometric).abs() / of_shading;
         }
         // Russian roulette that keeps the photons' powers alike.
         let probability = (scattered.max_element() / flux.max_element()).min(1.0);
