@@ -56,6 +56,11 @@ bool is_followed(Material material) {
     return !(is_matte(material) || (is_glossy(material) && material.roughness * material.roughness >= FOLLOWED_ALPHA));
 }
 
+// Whether what is followed lies over a base, which visible points show.
+bool has_base(Material material) {
+    return is_glossy(material);
+}
+
 // Whether what is followed has a width, so that lights that are points show in it.
 bool has_width(Material material) {
     bool is_rough = is_glossy(material) && material.roughness * material.roughness >= SMOOTH_ALPHA;

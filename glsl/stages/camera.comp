@@ -193,6 +193,8 @@ void main() {
                     ended = true;
                     if (follows && branch.depth + 1u >= settings.max_depth) {
                         atomicAdd(status.truncated_paths, 1u);
+                        // What isn't reflected needs no further ray.
+                        stops = has_base(met.material);
                     } else if (follows) {
                         branch.depth += 1u;
                         u = next4(random);

@@ -5,6 +5,7 @@
 
 use ppm_vk::internals::config::RenderConfig;
 use ppm_vk::internals::cpu::{self, Receivers};
+use ppm_vk::internals::layout::{FOLLOWED_ALPHA, GLOSSY_SURFACE};
 use ppm_vk::internals::random::CameraTurn;
 use ppm_vk::internals::stage::BufferId;
 
@@ -107,6 +108,35 @@ fn paths_that_go_straight_end_where_the_cpus_end_and_gather_what_those_gather() 
     ] {
         assert_camera_agrees(name, small(), least_seen, least_compared);
     }
+}
+
+/// What the limit ends is the reflection. Plain paths end at the base by chance, the kernels' all do.
+#[test]
+fn the_bounce_limit_leaves_the_base_of_narrow_surfaces() {
+    let config = RenderConfig {
+        max_depth: 1,
+        ..small()
+    };
+    let mut bench = Bench::new("glossy", config);
+    let seen = bench.seen();
+    let paths = bench.plain().trace_camera_paths(last_turn(&bench.config));
+    let [width, _] = bench.config.resolution.map(|side| side as usize);
+    let mut bases = Agreement::default();
+    for (slot, found) in seen.points.iter().enumerate() {
+        let pixel = ppm_vk::internals::config::pixel_of(bench.config.resolution, slot as u32);
+        let [x, y] = pixel.expect("whole tiles").map(|at| at as usize);
+        let Some(expected) = paths[y * width + x].points.first() else {
+            continue;
+        };
+        let surface = &expected.surface;
+        let is_narrow = f64::from(surface.material.roughness).powi(2) < FOLLOWED_ALPHA;
+        if surface.material.surface == GLOSSY_SURFACE && is_narrow {
+            let same = object(found.position_object) == Some(surface.object)
+                && xyz(found.position_object).distance(surface.position) < 2e-5;
+            bases.note(same, || format!("slot {slot}: {found:?} instead of {expected:?}"));
+        }
+    }
+    bases.assert("bases of narrow surfaces", 0.999, 100);
 }
 
 #[test]
