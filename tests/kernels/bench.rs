@@ -159,16 +159,22 @@ impl Bench {
 
     /// The same with a change to the scene.
     pub fn with(name: &str, config: RenderConfig, change: impl FnOnce(&mut PackedScene)) -> Self {
+        Self::seen_with(name, config, |scene, _| change(scene))
+    }
+
+    /// The same with a change to the scene or its camera.
+    pub fn seen_with(name: &str, config: RenderConfig, change: impl FnOnce(&mut PackedScene, &mut Camera)) -> Self {
         let loaded = scene(name);
         let mut scene = packed(&loaded);
-        change(&mut scene);
+        let mut camera = loaded.cameras[0].clone();
+        change(&mut scene, &mut camera);
         let device = Device::open(None).expect("a Vulkan device");
-        let mut renderer = Renderer::new(device, &scene, &loaded.cameras[0], config.clone()).expect("a renderer");
+        let mut renderer = Renderer::new(device, &scene, &camera, config.clone()).expect("a renderer");
         renderer.iterate().expect("an iteration");
         let settings = download(&mut renderer, BufferId::Settings)[0];
         Self {
             scene,
-            camera: loaded.cameras[0].clone(),
+            camera,
             config,
             settings,
             renderer,

@@ -57,7 +57,7 @@ fn mean_of(samples: &[f64]) -> (f64, f64) {
 }
 
 /// A difference of means of 12 samples exceeds 7.5 of its standard errors with a probability of 2·10⁻⁷ (Student, 22 degrees of
-/// freedom): 51 numbers of each of 20 cases fail a right pair of programs once in 5,000 runs. What radii blur is alike but for
+/// freedom): 51 numbers of each of 21 cases fail a right pair of programs once in 4,500 runs. What radii blur is alike but for
 /// their number of maps: half a hundredth of a block, which is taken off, and three thousandths of the whole picture.
 #[test]
 fn both_renderers_converge_to_the_same_picture() {
@@ -85,6 +85,7 @@ fn both_renderers_converge_to_the_same_picture() {
         ("cornell, lit", Estimator::Sppm, Direct::Light, 1),
         ("cornell, patterned", Estimator::Sppm, Direct::Light, 1),
         ("cornell, softly lit", Estimator::Sppm, Direct::Light, 1),
+        ("glossy", Estimator::Sppm, Direct::Light, 1),
     ] {
         let what = format!("{name}, {estimator:?}, direct light from {direct:?}, {max_depth} bounces");
         let (mut found, mut expected) = (Vec::new(), Vec::new());
@@ -105,7 +106,11 @@ fn both_renderers_converge_to_the_same_picture() {
                 seed,
                 ..small()
             };
-            let mut bench = Bench::new(name, config);
+            // The paper's estimator looks through the pixels' centres. In the middle of a room those of the picture's diagonals meet
+            // the edges of walls, where rounding says which wall is seen.
+            let mut bench = Bench::seen_with(name, config, |_, camera| {
+                camera.forward += 0.01 * camera.right + 0.007 * camera.up;
+            });
             found.extend(samples(&mut bench.renderer, estimator));
             expected.extend(samples(&mut bench.plain(), estimator));
         }
