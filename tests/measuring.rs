@@ -161,7 +161,9 @@ fn converge_follows_the_error_of_each_setting() {
             "--reference",
             "reference.exr",
             "--time",
-            "2",
+            "600",
+            "--iterations",
+            "64",
             "--photons",
             "2000",
             "--seed",
@@ -185,10 +187,9 @@ fn converge_follows_the_error_of_each_setting() {
             .filter(|row| row[0] == setting)
             .map(|row| row[4].parse::<f64>().expect("relMSE"));
         let errors: Vec<f64> = errors.collect();
-        assert!(
-            errors.len() > 2 && errors[errors.len() - 1] < errors[0],
-            "{setting}: {errors:?}"
-        );
+        // After 1, 2, 4, … iterations.
+        assert_eq!(errors.len(), 7, "{setting}: {errors:?}");
+        assert!(errors[6] < errors[0], "{setting}: {errors:?}");
     }
     assert!(
         std::fs::read_to_string(folder.path().join("c.svg"))

@@ -22,6 +22,8 @@ pub struct Converge<'a> {
     pub reference: &'a Image,
     /// Seconds of rendering, for each setting.
     pub seconds: f64,
+    /// Iterations that each setting gets at the most.
+    pub iterations: Option<u32>,
     /// Settings and their names.
     pub settings: Vec<(String, RenderConfig)>,
     /// Whether to stop; called after every iteration. Measurements so far are kept.
@@ -117,7 +119,7 @@ fn follow(
         let launches = run.iter().flat_map(|run| &run.launches);
         device_s += launches.map(|launch| launch.duration_ns * 1e-9).sum::<f64>();
         let iterations = session.iterations();
-        let last = run.is_none() || wall_s >= what.seconds || (what.stop)();
+        let last = run.is_none() || wall_s >= what.seconds || what.iterations == Some(iterations) || (what.stop)();
         let is_known = known
             .curves
             .last()

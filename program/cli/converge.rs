@@ -29,6 +29,9 @@ pub struct ConvergeArguments {
     /// Seconds of rendering, for each setting.
     #[arg(long, value_name = "SECONDS", default_value = "30", allow_negative_numbers = true, value_parser = seconds)]
     time: std::time::Duration,
+    /// Stop after this number of iterations, if the time suffices for them.
+    #[arg(long, value_name = "N", value_parser = count)]
+    iterations: Option<u32>,
     /// Settings to compare; without it there is one curve, of the defaults.
     #[arg(long, value_enum)]
     vary: Option<Vary>,
@@ -153,6 +156,7 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
         platform: Platform::Vulkan(arguments.device.clone()),
         reference: &reference,
         seconds: arguments.time.as_secs_f64(),
+        iterations: arguments.iterations,
         settings: settings(&base, arguments.vary),
         stop: &interrupt::asked,
     };
