@@ -7,7 +7,7 @@ use super::constants::*;
 use super::shape::{FieldLayout, Layout, Shared};
 
 device_structs! {
-    /// A material. Textures are indices of [`TextureLookup`]s, or [`NO_TEXTURE`]; each is a factor.
+    /// A material. Textures are indices of [`TextureLookup`](super::TextureLookup)s, or [`NO_TEXTURE`]; each is a factor.
     pub struct Material: 176 {
         /// Linear RGB albedo, reflectance or tint.
         pub base_color: [f32; 3],
