@@ -132,9 +132,9 @@ mod tests {
         for words in [
             "elements, \"children\" and \"images\";",
             "null, \"extensions\" and \"textures\";",
-            "know, \"COLOR\" and \"NORMAL_0\";",
+            "unknown attributes, \"COLOR\" and \"NORMAL_0\";",
             "elements, accessor 1;",
-            "wrap, sampler 1 and sampler 2;",
+            "wrap modes, sampler 1 and sampler 2;",
         ] {
             assert!(lines[0].contains(words), "«{words}» isn't in: {}", lines[0]);
         }
