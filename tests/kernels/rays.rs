@@ -133,19 +133,31 @@ fn rays_meet_the_same_triangles_at_the_same_places_by_every_search() {
             .chunks_exact(2)
             .map(|pair| ray(place(pair[0]), place(pair[1]) - place(pair[0])))
             .collect();
+        // Some drivers end loops early, of which a ray may use a quarter.
+        let limit = Device::open(None)
+            .and_then(|mut device| device.loop_limit())
+            .expect("a limit");
+        let triangles = PackedScene::new(&scene).expect("a hierarchy").seen_triangles();
+        let is_cut = limit != u32::MAX && triangles > u64::from(limit / 4);
+        if is_cut {
+            println!("{name}: skipped brute, since the driver ends loops after {limit} iterations");
+        }
         let mut tests = vec![TriangleTest::Watertight];
         // With instances, each search rounds the way into the space of Havel's planes on its own.
         if name != "instances" {
             tests.push(TriangleTest::Havel);
         }
         for test in tests {
-            let mut hits = accels().into_iter().map(|accel| {
-                let hits = Probe::with(&scene, test, accel).hits(&rays);
-                (
-                    accel,
-                    hits.into_iter().map(|hit| hit.map(f32::to_bits)).collect::<Vec<_>>(),
-                )
-            });
+            let mut hits = accels()
+                .into_iter()
+                .filter(|accel| *accel != Accel::Brute || !is_cut)
+                .map(|accel| {
+                    let hits = Probe::with(&scene, test, accel).hits(&rays);
+                    (
+                        accel,
+                        hits.into_iter().map(|hit| hit.map(f32::to_bits)).collect::<Vec<_>>(),
+                    )
+                });
             let (_, expected) = hits.next().expect("a search");
             let met = expected.iter().filter(|hit| hit[3] != u32::MAX).count();
             assert!(4 * met > rays.len(), "{name}: only {met} rays meet anything");
