@@ -59,20 +59,9 @@ fn main() -> Result<()> {
         fs::write(out.join(format!("{name}.spv")), optimised.as_binary_u8())?;
         let entry_point = reflect(named.as_binary(), false).with_context(|| source.display().to_string())?;
         check_bindings(optimised.as_binary(), &entry_point).with_context(|| source.display().to_string())?;
-        let by_query = with_ray_query(&compiler, &text, &file, &root)?;
+        let by_query = with_ray_query(&compiler, &text, &file, &root, &entry_point)
+            .with_context(|| format!("{file} with ray queries"))?;
         if let Some(module) = &by_query {
-            check_bindings(module.as_binary(), &entry_point).with_context(|| format!("{file} with ray queries"))?;
-            let named = compile(
-                &compiler,
-                &by_query_text(&text)?,
-                &file,
-                &root,
-                shaderc::OptimizationLevel::Zero,
-            )?;
-            ensure!(
-                slots(&reflect(named.as_binary(), false)?) == slots(&entry_point),
-                "{file}: bindings are numbered otherwise with ray queries"
-            );
             fs::write(out.join(format!("{name}.ray_query.spv")), module.as_binary_u8())?;
         }
         describe(&mut module, &name, &entry_point, by_query.is_some()).with_context(|| source.display().to_string())?;
@@ -112,13 +101,6 @@ fn compile(
     Ok(compiler.compile_into_spirv(text, shaderc::ShaderKind::Compute, file, "main", Some(&options))?)
 }
 
-fn by_query_text(text: &str) -> Result<String> {
-    let (version, rest) = text.split_once('\n').context("an empty stage")?;
-    Ok(format!(
-        "{version}\n#extension GL_EXT_ray_query : require\n#define RAY_QUERY\n#line 2\n{rest}"
-    ))
-}
-
 /// Bindings of the first descriptor set, with their buffers' names.
 fn slots(entry_point: &EntryPoint) -> BTreeMap<u32, String> {
     let slot = |variable: &Variable| match variable {
@@ -136,16 +118,19 @@ fn slots(entry_point: &EntryPoint) -> BTreeMap<u32, String> {
     entry_point.vars.iter().filter_map(slot).collect()
 }
 
-/// The stage with ray queries, if it traces rays: a module that other devices can't load.
+/// The stage with ray queries, if it traces rays: a module that other devices can't load. `plain` is the stage without them, whose
+/// bindings it must have.
 fn with_ray_query(
     compiler: &shaderc::Compiler,
     text: &str,
     file: &str,
     root: &Path,
+    plain: &EntryPoint,
 ) -> Result<Option<shaderc::CompilationArtifact>> {
     const OP_RAY_QUERY_INITIALIZE: u32 = 4473;
     let level = shaderc::OptimizationLevel::Performance;
-    let text = by_query_text(text)?;
+    let (version, rest) = text.split_once('\n').context("an empty stage")?;
+    let text = format!("{version}\n#extension GL_EXT_ray_query : require\n#define RAY_QUERY\n#line 2\n{rest}");
     let preprocessed = compiler.preprocess(&text, file, "main", Some(&options(root, level)?))?;
     if !preprocessed.as_text().contains("rayQueryInitializeEXT") {
         return Ok(None);
@@ -155,7 +140,16 @@ fn with_ray_query(
     let traces = instructions(module.as_binary())?
         .iter()
         .any(|instruction| code(instruction) == OP_RAY_QUERY_INITIALIZE);
-    Ok(traces.then_some(module))
+    if !traces {
+        return Ok(None);
+    }
+    check_bindings(module.as_binary(), plain)?;
+    let named = compile(compiler, &text, file, root, shaderc::OptimizationLevel::Zero)?;
+    ensure!(
+        slots(&reflect(named.as_binary(), false)?) == slots(plain),
+        "bindings have other numbers"
+    );
+    Ok(Some(module))
 }
 
 fn options(root: &Path, level: shaderc::OptimizationLevel) -> Result<shaderc::CompileOptions<'_>> {
