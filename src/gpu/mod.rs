@@ -18,4 +18,5 @@ pub use context::DeviceSummary;
 pub(crate) use device::remedy;
 pub use device::{Device, best_device, devices};
 pub use execute::{Done, Ticket};
+pub(crate) use ray_tracing::no_ray_query;
 pub use statistics::Compiler;

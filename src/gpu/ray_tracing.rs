@@ -11,7 +11,7 @@ use gpu_allocator::MemoryLocation;
 use super::buffer::Buffer;
 use super::context::{Context, OrVulkan};
 use super::device::Device;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::layout::{Instance, ShadingTriangle};
 
 /// Required extensions.
@@ -377,10 +377,10 @@ impl Device {
     }
 }
 
-pub(super) fn no_ray_query(device: &str) -> Error {
-    Error::Device(format!(
-        "device {device} has no ray queries (VK_KHR_ray_query); use bvh or another device"
-    ))
+/// The error for a device without ray queries.
+pub(crate) fn no_ray_query(device: &str) -> Error {
+    let what = format!("ray-query: device {device} has no VK_KHR_ray_query; use bvh or another device");
+    Error::setting(Setting::Accel, what)
 }
 
 const SCRATCH: vk::BufferUsageFlags = vk::BufferUsageFlags::STORAGE_BUFFER;

@@ -18,11 +18,9 @@ use crate::config::{Accel, RenderConfig, Totals};
 use crate::emission::Aim;
 use crate::error::{Error, Result, Setting};
 use crate::gather::{METHODS, default_method, grid_sizes};
-use crate::gpu::{Device, DeviceSummary};
+use crate::gpu::{Device, DeviceSummary, no_ray_query};
 use crate::layout::{Settings, StatusCounters};
-use crate::packing::IN_VACUUM;
-use crate::packing::PackedScene;
-use crate::packing::SceneFeatures;
+use crate::packing::{IN_VACUUM, PackedScene, SceneFeatures};
 use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
 use crate::scene::Camera;
@@ -270,13 +268,7 @@ fn accel_on(config: &RenderConfig, device: &DeviceSummary) -> Result<Accel> {
     match config.accel {
         Accel::Auto if is_gpu && device.ray_query => Ok(Accel::RayQuery),
         Accel::Auto => Ok(Accel::Bvh),
-        Accel::RayQuery if !device.ray_query => {
-            let what = format!(
-                "ray-query: device {} has no VK_KHR_ray_query; use bvh or another device",
-                device.name
-            );
-            Err(Error::setting(Setting::Accel, what))
-        }
+        Accel::RayQuery if !device.ray_query => Err(no_ray_query(&device.name)),
         chosen => Ok(chosen),
     }
 }
