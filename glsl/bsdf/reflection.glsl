@@ -123,8 +123,7 @@ float reflection_probability(Bsdf bsdf, float nv) {
 
 // The weight of what a smooth boundary mirrors, chosen with this probability.
 vec3 mirrored_part(Bsdf bsdf, float nv, float probability) {
-    vec3 mirrored = fresnel(bsdf, nv) * (coat_passes(bsdf.coat, nv) / probability);
-    return has_sheen(bsdf) ? sheen_passes(bsdf, nv, nv) * mirrored : mirrored;
+    return sheen_passes(bsdf, nv, nv) * fresnel(bsdf, nv) * (coat_passes(bsdf.coat, nv) / probability);
 }
 
 // BRDF · cos / density of a direction from `reflected_direction`, or of a mirror's.
@@ -135,7 +134,7 @@ vec3 reflected_weight(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
     float vh = smooth_boundary ? nv : dot(v, normalize(v + l));
     float masking = smooth_boundary ? 1.0 : (nl > 0.0 ? joint_masking(bsdf.alpha, nv, nl) : 0.0);
     vec3 weight = fresnel(bsdf, vh) * (coat_passes(bsdf.coat, vh) * masking);
-    return has_sheen(bsdf) ? sheen_passes(bsdf, nv, smooth_boundary ? nv : max(nl, 0.0)) * weight : weight;
+    return sheen_passes(bsdf, nv, smooth_boundary ? nv : max(nl, 0.0)) * weight;
 }
 
 // The reflection of a boundary that paths follow has been taken away from what a visible point shows.
