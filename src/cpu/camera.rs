@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::bsdf::{Branch, Bsdf, Width};
 use super::direct::narrow_reflection_of_lights;
-use super::dispersion::choose_wavelength;
+use super::dispersion::disperse;
 use super::environment::Environment;
 use super::interaction::Interaction;
 use super::intersect::{PlacedTriangle, Ray};
@@ -16,7 +16,7 @@ use super::texture::nearest_seen;
 use super::vector::xyz;
 use super::{FAR, Inputs};
 use crate::config::Estimator;
-use crate::layout::{DIELECTRIC, Settings};
+use crate::layout::Settings;
 use crate::random::{CameraTurn, PathKind, Random};
 
 /// Where a camera path ends: the paper's hitpoint.
@@ -220,12 +220,7 @@ fn meet(inputs: &Inputs<'_>, segment: &mut Segment, path: &mut CameraPath, rando
         }
         path.met = true;
         path.emitted += segment.throughput * met.emitted(incoming);
-        let material = &met.surface.material;
-        if segment.wavelength.is_none() && material.surface == DIELECTRIC && material.dispersion > 0.0 {
-            let (wavelength, color) = choose_wavelength(random.next4()[0]);
-            segment.wavelength = Some(wavelength);
-            segment.throughput *= color;
-        }
+        segment.throughput *= disperse(&met.surface.material, &mut segment.wavelength, random);
         return Some(met);
     }
 }

@@ -9,7 +9,7 @@ use super::camera::VisiblePoint;
 use super::environment::Environment;
 use super::interaction::Interaction;
 use super::intersect::{Hit, PlacedTriangle, Ray};
-use super::lights::{is_punctual, met_emitter, punctual, sample_incident};
+use super::lights::{met_emitter, punctual, sample_incident};
 use super::media::{Media, transmittance};
 use super::surface::surface_of;
 use super::texture::nearest_visible;
@@ -116,7 +116,7 @@ pub fn narrow_reflection_of_lights(
 ) -> DVec3 {
     let place = DVec2::from([0, 1].map(|number| random.number_of([number, DELTA_LIGHT_NUMBERS])));
     let mut sum = DVec3::ZERO;
-    for light in inputs.scene.lights.iter().filter(|light| is_punctual(light)) {
+    for light in inputs.scene.lights.iter().filter(|light| light.is_punctual()) {
         let origin = met
             .surface
             .origin_towards(punctual(light, met.surface.position, place).0);

@@ -2,7 +2,8 @@
 
 use glam::{DVec3, dvec3};
 
-use crate::layout::{LONGEST_WAVELENGTH, Material, SHORTEST_WAVELENGTH};
+use crate::layout::{DIELECTRIC, LONGEST_WAVELENGTH, Material, SHORTEST_WAVELENGTH};
+use crate::random::Random;
 
 /// The part of a wavelength in linear sRGB, whose mean over all is 1 for each channel.
 fn color_of(wavelength: f64) -> DVec3 {
@@ -29,10 +30,14 @@ pub fn ior_at(material: &Material, wavelength: f64) -> f64 {
     (ior + spread * (0.523_655 / (micrometres * micrometres) - 1.5168)).max(1.0)
 }
 
-/// A wavelength, and the factor of what a path carries that has it alone.
-pub fn choose_wavelength(u: f64) -> (f64, DVec3) {
-    let wavelength = SHORTEST_WAVELENGTH + (LONGEST_WAVELENGTH - SHORTEST_WAVELENGTH) * u;
-    (wavelength, color_of(wavelength))
+/// Gives a path that meets its first dispersive material a wavelength (nm). Returns the factor of the path's throughput.
+pub fn disperse(material: &Material, wavelength: &mut Option<f64>, random: &mut Random) -> DVec3 {
+    if wavelength.is_some() || material.surface != DIELECTRIC || material.dispersion <= 0.0 {
+        return DVec3::ONE;
+    }
+    let chosen = SHORTEST_WAVELENGTH + (LONGEST_WAVELENGTH - SHORTEST_WAVELENGTH) * random.next4()[0];
+    *wavelength = Some(chosen);
+    color_of(chosen)
 }
 
 #[cfg(test)]

@@ -11,9 +11,7 @@ use super::media::{Media, Medium, bounded_medium, ior_of_medium};
 use super::surface::{Normals, Surface, surface_of};
 use super::texture::{apply_textures, is_face_there, share_there};
 use super::vector::rgb;
-use crate::layout::{
-    BACK_EMITS, BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, Material, PARALLEL, ROUNDINGS, SEE_THROUGH, TOUCHED,
-};
+use crate::layout::{BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, Material, PARALLEL, ROUNDINGS, SEE_THROUGH, TOUCHED};
 use crate::random::Random;
 
 /// What lies in the place where a ray meets matter.
@@ -49,7 +47,7 @@ pub(super) fn is_hidden_back(surface: &Surface, incoming: DVec3) -> bool {
 fn preference(surface: &Surface, incoming: DVec3) -> (bool, bool, bool, bool, u32) {
     let front = is_front(surface, incoming);
     let material = &surface.material;
-    let shines = rgb(material.emission).max_element() > 0.0 && (front || material.flags & BACK_EMITS != 0);
+    let shines = rgb(material.emission).max_element() > 0.0 && emits(material, front);
     let hidden = material.flags & BACK_HIDDEN != 0;
     (shines, front, !hidden, surface.flags & SEE_THROUGH != 0, surface.object)
 }

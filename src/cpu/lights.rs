@@ -18,8 +18,7 @@ use super::vector::rgb;
 use super::{FAR, Inputs};
 use crate::alias::{self, AliasCell};
 use crate::layout::{
-    BACK_EMITS, DIRECTIONAL_LIGHT, ENDS_BEFORE, ENVIRONMENT_LIGHT, Light, Material, POINT_LIGHT, SPOT_LIGHT,
-    TRIANGLE_LIGHT,
+    BACK_EMITS, DIRECTIONAL_LIGHT, ENDS_BEFORE, ENVIRONMENT_LIGHT, Light, Material, SPOT_LIGHT, TRIANGLE_LIGHT,
 };
 use crate::packing::Part;
 
@@ -31,11 +30,6 @@ pub(super) fn emits(material: &Material, front: bool) -> bool {
 /// Radiance at this cosine to the normal: a coat lies on lamps too.
 pub(super) fn emitted_radiance(material: &Material, cosine: f64) -> DVec3 {
     coat_passes(f64::from(material.coat), cosine) * rgb(material.emission)
-}
-
-/// Whether it is no surface and no environment.
-pub(super) fn is_punctual(light: &Light) -> bool {
-    [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&light.kind)
 }
 
 /// How much of its intensity a spot has at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as
@@ -96,7 +90,7 @@ pub fn sample_incident(
             density: Some(sky.density),
         });
     }
-    if is_punctual(light) {
+    if light.is_punctual() {
         let origin = origin(punctual(light, point, u).0);
         let (direction, end, irradiance) = punctual(light, origin, u);
         return Some(LightSample {
@@ -193,7 +187,7 @@ pub fn punctual(light: &Light, point: DVec3, u: DVec2) -> (DVec3, f64, DVec3) {
 /// Radiance of a light with an extent where a ray along a unit vector meets it, and how far away; `None` where it passes by.
 pub fn soft_light_along(light: &Light, ray: Ray) -> Option<(DVec3, f64)> {
     let extent = f64::from(light.extent);
-    if !is_punctual(light) || extent <= 0.0 {
+    if !light.is_punctual() || extent <= 0.0 {
         return None;
     }
     let intensity = rgb(light.intensity);
@@ -338,6 +332,7 @@ fn spot_versine(light: &Light, u: f64) -> (f64, f64) {
     };
     (versine, 2.0 * PI * whole)
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;

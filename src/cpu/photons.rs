@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::bsdf::choose;
-use super::dispersion::choose_wavelength;
+use super::dispersion::disperse;
 use super::interaction::Interaction;
 use super::lights::{Emission, choose_by_power, range_window, sample_emission};
 use super::media::{Media, transmittance};
@@ -12,7 +12,7 @@ use super::texture::nearest_visible;
 use super::vector::with_word;
 use super::{FAR, Inputs};
 use crate::config::Direct;
-use crate::layout::{DIELECTRIC, Photon};
+use crate::layout::Photon;
 use crate::random::Random;
 
 /// How a path ended.
@@ -66,12 +66,7 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
             continue;
         }
         depth += 1;
-        let material = &met.surface.material;
-        if wavelength.is_none() && material.surface == DIELECTRIC && material.dispersion > 0.0 {
-            let (chosen, color) = choose_wavelength(random.next4()[0]);
-            wavelength = Some(chosen);
-            flux *= color;
-        }
+        flux *= disperse(&met.surface.material, &mut wavelength, &mut random);
         let (v, bsdf) = (-incoming, met.bsdf(wavelength));
         // The adjoint BSDF, since flux is per area of the geometric surface: Veach, «Robust Monte Carlo Methods for Light Transport
         // Simulation», 1997, section 5.3.

@@ -74,6 +74,13 @@ material_features! { features
     lens: "LENS",
 }
 
+impl Light {
+    /// Whether it is a point, a spot or a direction.
+    pub(crate) fn is_punctual(&self) -> bool {
+        [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&self.kind)
+    }
+}
+
 impl SceneFeatures {
     /// The features of what is seen, of materials that triangles have, and of the lights.
     pub(crate) fn of(triangles: &[ShadingTriangle], materials: &[Material], lights: &[Light]) -> Self {
@@ -87,7 +94,7 @@ impl SceneFeatures {
             features.coincidence |= triangle.flags & (COINCIDENT | BACKED) != 0;
         }
         for light in lights {
-            features.punctual |= [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&light.kind);
+            features.punctual |= light.is_punctual();
             features.soft |= light.extent > 0.0;
             features.parted |= light.kind == TRIANGLE_LIGHT && !Part::of(light).is_whole();
             features.environment |= light.kind == ENVIRONMENT_LIGHT;
