@@ -47,11 +47,7 @@ fn of_remedy(remedy: Remedy) -> String {
 
 /// The failure that ended a render early.
 pub fn of_failure(failure: &Failure) -> Error {
-    let Failure { error, iteration, kept } = failure;
-    anyhow!(
-        "{}: iteration {iteration} failed, and the picture is that of the first {kept}",
-        of_library(error)
-    )
+    anyhow!("{}: {}", of_library(&failure.error), failure.consequence())
 }
 
 /// A remark about a scene.

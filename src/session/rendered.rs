@@ -22,13 +22,17 @@ pub struct Failure {
     pub kept: u32,
 }
 
+impl Failure {
+    /// What it means for the picture, in one line.
+    pub fn consequence(&self) -> String {
+        let Self { iteration, kept, .. } = self;
+        format!("iteration {iteration} failed, and the picture is that of the first {kept}")
+    }
+}
+
 impl fmt::Display for Failure {
     fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { error, iteration, kept } = self;
-        write!(
-            text,
-            "{error}: iteration {iteration} failed, and the picture is that of the first {kept}"
-        )
+        write!(text, "{}: {}", self.error, self.consequence())
     }
 }
 

@@ -129,8 +129,7 @@ impl fmt::Display for Warning {
             Self::Cut { paths, emitted } => write!(
                 text,
                 "{paths} paths were ended by the driver's loop limit, {} of {emitted} photon paths; about that share of the \
-                 light is \
-                 missing",
+                 light is missing",
                 percent(share(paths, emitted))
             ),
             Self::Lost { photons, stored, cells } => write!(
