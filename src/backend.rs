@@ -10,9 +10,7 @@ use crate::metrics;
 use crate::packing::PackedScene;
 use crate::radius::{MOST_FOOTPRINTS, PILOT_FOOTPRINTS};
 use crate::record::Run;
-use crate::scene::Camera;
-use crate::scene::Lens;
-use crate::scene::Projection;
+use crate::scene::{Camera, Lens, Projection};
 
 /// A progressive render.
 pub trait Backend {

@@ -7,9 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::targets::{Targets, corners_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
-use crate::packing::PackedScene;
-use crate::packing::Part;
-use crate::packing::Sphere;
+use crate::packing::{PackedScene, Part, Sphere};
 
 /// Minimum probability of a stratum, relative to its share of the power: no photon carries much more flux than by power.
 const FLOOR: f64 = 0.2;

@@ -9,8 +9,7 @@ use crate::layout::{
     DIELECTRIC, FOLLOWED_ALPHA, GLOSSY_SURFACE, Light, MIRROR, Material, NO_OBJECT, POINT_LIGHT, SPOT_LIGHT,
     ShadingTriangle, VisiblePoint,
 };
-use crate::packing::PackedScene;
-use crate::packing::Sphere;
+use crate::packing::{PackedScene, Sphere};
 use crate::scene::Placement;
 use crate::sizes::MOST_TARGETS;
 

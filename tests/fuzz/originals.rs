@@ -5,8 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use ppm_vk::internals::loader::LoadOptions;
-use ppm_vk::internals::scene::Environment;
-use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::{Environment, Scene};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 

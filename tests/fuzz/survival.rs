@@ -8,9 +8,7 @@ use std::time::{Duration, Instant};
 
 use ppm_vk::internals::error::Result;
 use ppm_vk::internals::packing::PackedScene;
-use ppm_vk::internals::scene::Environment;
-use ppm_vk::internals::scene::Projection;
-use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::{Environment, Projection, Scene};
 
 /// The longest that a small file may take, whatever is wrong with it, on a machine that does other things as well.
 const MOST_TIME: Duration = Duration::from_secs(30);

@@ -12,8 +12,7 @@ use ppm_vk::internals::layout::{DIELECTRIC, MIRRORED, Settings, ShadingTriangle,
 use ppm_vk::internals::metrics::compare;
 use ppm_vk::internals::packing::PackedScene;
 use ppm_vk::internals::pipeline::Renderer;
-use ppm_vk::internals::scene::Placement;
-use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::{Placement, Scene};
 use serde_json::{Value, json};
 
 use super::agreement::Agreement;

@@ -7,8 +7,7 @@ use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::RenderConfig;
 use ppm_vk::internals::cpu;
 use ppm_vk::internals::film::Image;
-use ppm_vk::internals::scene::Environment;
-use ppm_vk::internals::scene::Projection;
+use ppm_vk::internals::scene::{Environment, Projection};
 
 use crate::document::{Document, light, matte, mirror, one_sided};
 use crate::measure::{Region, measure};

@@ -6,9 +6,7 @@ use ppm_vk::internals::config::{EmissionChoice, Estimator, RenderConfig};
 use ppm_vk::internals::estimate::{ErrorEstimate, RelativeError, of_one_photon};
 use ppm_vk::internals::film::Image;
 use ppm_vk::internals::metrics::{compare, relative_errors};
-use ppm_vk::internals::scene::Environment;
-use ppm_vk::internals::scene::LightKind;
-use ppm_vk::internals::scene::PunctualLight;
+use ppm_vk::internals::scene::{Environment, LightKind, PunctualLight};
 
 use crate::document::{Document, clear, matte};
 use crate::mesh::Mesh;

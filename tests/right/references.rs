@@ -4,8 +4,7 @@ use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::{Direct, Estimator, RenderConfig};
 use ppm_vk::internals::film::Image;
 use ppm_vk::internals::loader::LoadOptions;
-use ppm_vk::internals::scene::Environment;
-use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::{Environment, Scene};
 
 use crate::measure::{Measured, measure};
 use crate::picture::{Subject, folder, reference, small};

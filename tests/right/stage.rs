@@ -5,9 +5,7 @@ use std::fs;
 
 use glam::{DVec3, dvec3};
 use ppm_vk::internals::loader::LoadOptions;
-use ppm_vk::internals::scene::Environment;
-use ppm_vk::internals::scene::Projection;
-use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::{Environment, Projection, Scene};
 use tempfile::TempDir;
 
 use crate::document::Document;

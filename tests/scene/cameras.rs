@@ -3,8 +3,7 @@
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use glam::Vec3;
-use ppm_vk::internals::scene::Camera;
-use ppm_vk::internals::scene::Projection;
+use ppm_vk::internals::scene::{Camera, Projection};
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_close};

@@ -8,8 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 use ppm_vk::internals::error::{Error, Result};
 use ppm_vk::internals::loader::LoadOptions;
-use ppm_vk::internals::scene::Environment;
-use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::{Environment, Scene};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 

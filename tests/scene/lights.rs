@@ -5,12 +5,9 @@ use std::f64::consts::PI;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
-use ppm_vk::internals::loader::LightUnits;
-use ppm_vk::internals::loader::LoadOptions;
-use ppm_vk::internals::packing::EmissiveTriangle;
-use ppm_vk::internals::packing::PackedScene;
-use ppm_vk::internals::scene::Environment;
-use ppm_vk::internals::scene::LightKind;
+use ppm_vk::internals::loader::{LightUnits, LoadOptions};
+use ppm_vk::internals::packing::{EmissiveTriangle, PackedScene};
+use ppm_vk::internals::scene::{Environment, LightKind};
 use ppm_vk::{LoadChoice, Remark};
 use serde_json::{Value, json};
 

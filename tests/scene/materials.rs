@@ -1,9 +1,7 @@
 //! Materials: what is supported, what is named in a warning, and what is refused.
 
 use glam::Vec3;
-use ppm_vk::internals::scene::Dielectric;
-use ppm_vk::internals::scene::Material;
-use ppm_vk::internals::scene::Surface;
+use ppm_vk::internals::scene::{Dielectric, Material, Surface};
 use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close};

@@ -1,8 +1,7 @@
 //! Which primitives nodes share.
 
 use glam::Vec3;
-use ppm_vk::internals::scene::SHARED;
-use ppm_vk::internals::scene::Scene;
+use ppm_vk::internals::scene::{SHARED, Scene};
 use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close};

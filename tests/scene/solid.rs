@@ -1,9 +1,7 @@
 //! Glass without a volume: thin by the specification, solid by `LoadOptions::solid_glass` where its mesh is closed.
 
 use ppm_vk::internals::loader::LoadOptions;
-use ppm_vk::internals::scene::Dielectric;
-use ppm_vk::internals::scene::Scene;
-use ppm_vk::internals::scene::Surface;
+use ppm_vk::internals::scene::{Dielectric, Scene, Surface};
 use serde_json::json;
 
 use crate::fixture::Fixture;

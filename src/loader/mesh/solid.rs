@@ -9,8 +9,7 @@ use gltf_json::Root;
 use super::geometry::Geometry;
 use crate::loader::diagnostic::{Check, label};
 use crate::loader::material::solid;
-use crate::scene::{LoadChoice, Remark};
-use crate::scene::{Material, Object, Surface};
+use crate::scene::{LoadChoice, Material, Object, Remark, Surface};
 use crate::text::{list, quote};
 
 /// Indices of the materials in use that are glass without a volume.
