@@ -7,7 +7,7 @@
 #include "trace/media.glsl"
 #include "trace/opacity.glsl"
 
-layout(constant_id = 8) const bool CONTACT = true;
+layout(constant_id = 8) const bool COINCIDENT_INTERFACES = true;
 layout(constant_id = 23) const bool CULLING = false;
 
 // The faces at the point where a ray hits a surface.
@@ -54,8 +54,8 @@ bool is_hidden_back(Surface surface, Material material, vec3 incoming) {
 
 // Whether other faces may coincide with a hit.
 bool may_coincide(Surface surface, bool front) {
-    bool touched = CONTACT && (surface.flags & TOUCHED) != 0u;
-    bool coincides = COINCIDENCE && ((surface.flags & COINCIDENT) != 0u || (!front && (surface.flags & BACKED) != 0u));
+    bool touched = COINCIDENT_INTERFACES && (surface.flags & TOUCHED) != 0u;
+    bool coincides = COINCIDENT_FACES && ((surface.flags & COINCIDENT) != 0u || (!front && (surface.flags & BACKED) != 0u));
     return touched || coincides;
 }
 

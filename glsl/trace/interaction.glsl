@@ -42,8 +42,8 @@ SurfaceInteraction no_interaction() {
 }
 
 bool finds_coincident_faces() {
-    bool finds = CONTACT;
-    if (COINCIDENCE) {
+    bool finds = COINCIDENT_INTERFACES;
+    if (COINCIDENT_FACES) {
         finds = true;
     }
     return finds;
@@ -108,11 +108,11 @@ bool is_glass(Surface surface) {
 
 // Whether faces that are not dielectric may coincide.
 bool faces_coincide() {
-    return COINCIDENCE;
+    return COINCIDENT_FACES;
 }
 
 bool may_lie_on_others(Surface surface) {
-    return (CONTACT && is_glass(surface)) || (surface.flags & (COINCIDENT | BACKED)) != 0u;
+    return (COINCIDENT_INTERFACES && is_glass(surface)) || (surface.flags & (COINCIDENT | BACKED)) != 0u;
 }
 
 // Whether light may pass a surface.

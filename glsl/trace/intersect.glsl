@@ -6,7 +6,7 @@
 
 layout(constant_id = 0) const bool BRUTE_FORCE = false;
 layout(constant_id = 4) const bool HAVEL = false; // the paper's triangle test instead of the watertight one
-layout(constant_id = 26) const bool COINCIDENCE = false;
+layout(constant_id = 26) const bool COINCIDENT_FACES = false;
 
 uniform usamplerBuffer Bvh;
 uniform usamplerBuffer HavelTriangles;
@@ -41,7 +41,7 @@ bool comes_first(PlacedTriangle a, PlacedTriangle b) {
 bool is_nearer(float t, PlacedTriangle at, Progress progress, Hit hit) {
     bool later = t > progress.t;
     bool nearer = t < hit.t;
-    if (COINCIDENCE) {
+    if (COINCIDENT_FACES) {
         later = later || (t == progress.t && comes_first(progress.at, at));
         nearer = nearer || (t == hit.t && hit.triangle != MISS && comes_first(at, triangle_of(hit)));
     }
@@ -346,7 +346,7 @@ Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle igno
             }
         } else {
             // Rounding changes the order of coincident faces.
-            float reached = COINCIDENCE ? hit.t * (1.0 + TIE) : hit.t;
+            float reached = COINCIDENT_FACES ? hit.t * (1.0 + TIE) : hit.t;
             float enter_left = enter_box(record.row0.xyz, record.row1.xyz, local, reached);
             float enter_right = enter_box(record.row2.xyz, record.row3.xyz, local, reached);
             uint left = floatBitsToUint(record.row0.w);

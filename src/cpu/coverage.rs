@@ -92,7 +92,7 @@ pub fn can_have_photons(inputs: &Inputs<'_>, place: Place, radius: f64, u: [f64;
             return share_there(inputs.scene, &there) > 0.0;
         }
         let lies_on = there.flags & (COINCIDENT | BACKED) != 0;
-        if !(lies_on || (inputs.scene.features.contact && there.material.surface == DIELECTRIC)) {
+        if !(lies_on || (inputs.scene.features.coincident_interfaces && there.material.surface == DIELECTRIC)) {
             return false;
         }
         progress = Progress::past(hit);

@@ -1,4 +1,4 @@
-//! What of the renderer a scene needs: the kernels are specialised for it and have no code for the rest.
+//! The features that a scene uses. Kernels are specialised for them: unused features are compiled out.
 
 use super::part::Part;
 use crate::layout::{
@@ -7,10 +7,10 @@ use crate::layout::{
 };
 use crate::scene::material_features;
 
-/// Declares the features, each with its constant in the kernels, and with the materials' records that have it.
+/// Declares the features: the specialisation constant of each, and which materials use it.
 macro_rules! features {
     ($($(#[$doc:meta])* $feature:ident: $constant:literal $(= $has:expr)?,)*) => {
-        /// What a scene has. Each is a specialisation constant of the stages that trace rays.
+        /// The features of a scene. Each is a specialisation constant of the stages that trace rays.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
         pub struct SceneFeatures {
             $($(#[$doc])* pub $feature: bool,)*
@@ -19,15 +19,15 @@ macro_rules! features {
         const COUNT: usize = [$($constant),*].len();
 
         impl SceneFeatures {
-            /// Everything that a scene can have.
+            /// All features.
             pub const ALL: Self = Self { $($feature: true,)* };
 
-            /// Each feature's constant in the kernels, and its value.
+            /// The name and value of each specialisation constant.
             pub fn constants(self) -> [(&'static str, bool); COUNT] {
                 [$(($constant, self.$feature),)*]
             }
 
-            /// Those of these values, in the order of [`SceneFeatures::constants`].
+            /// From values in the order of [`SceneFeatures::constants`].
             pub fn of_constants(values: [bool; COUNT]) -> Self {
                 let [$($feature,)*] = values;
                 Self { $($feature,)* }
@@ -44,45 +44,45 @@ macro_rules! features {
 }
 
 material_features! { features
-    /// Boundaries of dielectrics that lie on other faces.
-    contact: "CONTACT",
-    /// Dielectrics inside of others, or overlapping them.
+    /// Dielectric faces that coincide with other faces.
+    coincident_interfaces: "COINCIDENT_INTERFACES",
+    /// Dielectrics inside others, or overlapping them.
     nested: "NESTED",
     /// Paths that start in a dielectric.
     immersed: "IMMERSED",
-    /// Faces in one place.
-    coincidence: "COINCIDENCE",
-    /// Lights that are points or directions.
+    /// Coincident faces.
+    coincident_faces: "COINCIDENT_FACES",
+    /// Point, spot and directional lights.
     punctual: "PUNCTUAL_LIGHTS",
     /// Some of those with an extent.
     soft: "SOFT_LIGHTS",
-    /// Triangles of several lights.
+    /// Emissive triangles that are divided into several lights.
     parted: "PARTED_LIGHTS",
-    /// An environment.
+    /// Environment lighting.
     environment: "ENVIRONMENT",
-    /// Textures, or colours of corners.
+    /// Textures or vertex colours.
     textured: "TEXTURED",
-    /// Surfaces that aren't there everywhere.
+    /// Partly transparent surfaces (alpha).
     alpha: "ALPHA",
     /// Instances that share triangles.
     instanced: "INSTANCED",
-    /// Several sources of light, so few that direct light asks each.
+    /// Several light sources, few enough that direct light samples each of them.
     few_sources: "FEW_SOURCES",
-    /// So many that one is chosen by what it can bring.
+    /// So many light sources that direct light samples one, chosen by a bound of its contribution.
     many_sources: "MANY_SOURCES",
-    /// A lens before the camera that is rendered.
+    /// The camera has a lens (depth of field).
     lens: "LENS",
 }
 
 impl Light {
-    /// Whether it is a point, a spot or a direction.
+    /// Whether it is a point, spot or directional light.
     pub(crate) fn is_punctual(&self) -> bool {
         [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&self.kind)
     }
 }
 
 impl SceneFeatures {
-    /// The features of what is seen, of materials that triangles have, and of the lights.
+    /// The features of triangles, of their materials, and of lights.
     pub(crate) fn of(triangles: &[ShadingTriangle], materials: &[Material], lights: &[Light]) -> Self {
         let mut features = Self::default();
         for triangle in triangles {
@@ -90,8 +90,8 @@ impl SceneFeatures {
             features.add_material(material);
             features.textured |= triangle.flags & TEXTURED_TRIANGLE != 0;
             features.alpha |= triangle.flags & SEE_THROUGH != 0;
-            features.contact |= triangle.flags & TOUCHED != 0;
-            features.coincidence |= triangle.flags & (COINCIDENT | BACKED) != 0;
+            features.coincident_interfaces |= triangle.flags & TOUCHED != 0;
+            features.coincident_faces |= triangle.flags & (COINCIDENT | BACKED) != 0;
         }
         for light in lights {
             features.punctual |= light.is_punctual();
@@ -102,18 +102,18 @@ impl SceneFeatures {
         features
     }
 
-    /// Those that the BSDFs of visible points have.
+    /// The lobes that the BSDFs of visible points can have.
     pub fn visible_lobes(self) -> VisibleLobes {
         let constants = self.constants();
         VISIBLE_LOBES.map(|lobe| constants.contains(&(lobe, true)))
     }
 
-    /// A constant's name for people.
+    /// A constant's name in messages.
     pub fn spell(constant: &str) -> String {
         constant.to_lowercase().replace('_', " ")
     }
 
-    /// Names of those that the scene has.
+    /// Names of the features that the scene uses.
     pub fn names(self) -> Vec<String> {
         let present = self.constants().into_iter().filter(|(_, present)| *present);
         present.map(|(name, _)| Self::spell(name)).collect()

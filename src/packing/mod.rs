@@ -159,9 +159,9 @@ impl PackedScene {
         features.nested = nesting.overlaps;
         features.few_sources = (2..=ASKED_ALL).contains(&light_table.sources.len());
         features.many_sources = light_table.sources.len() > ASKED_ALL;
-        features.coincidence |= features.contact || coincident.doubled;
+        features.coincident_faces |= features.coincident_interfaces || coincident.doubled;
         // Where a solid has no thickness, it is a thin wall.
-        features.thin_walls |= features.contact && coincident.doubled;
+        features.thin_walls |= features.coincident_interfaces && coincident.doubled;
         let mut texels = scene.textures.texels.clone();
         texels.resize(texels.len().next_multiple_of(4), 0);
         let (object_grids, object_cells) = object_grids(scene);
