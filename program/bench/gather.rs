@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::structure::{Structure, structure};
 use super::{median, stages_of};
 use ppm_vk::internals::backend::Backend as _;
-use ppm_vk::internals::cpu::{self, SeenByKernels};
+use ppm_vk::internals::cpu::{self, DeviceReceivers};
 use ppm_vk::internals::gather::{METHODS, Runs, Tests, is_gather_stage};
 use ppm_vk::internals::layout::{GATHERED_FOR, GROUP, Gathered, NO_OBJECT, Photon, VisiblePoint};
 use ppm_vk::internals::pipeline::Renderer;
@@ -121,8 +121,8 @@ struct Input {
 }
 
 impl Input {
-    fn seen(&self) -> SeenByKernels<'_> {
-        SeenByKernels {
+    fn seen(&self) -> DeviceReceivers<'_> {
+        DeviceReceivers {
             points: &self.points,
             bsdfs: &[],
             radii2: &self.radii2,
@@ -390,7 +390,7 @@ impl Measured {
         let points: Vec<VisiblePoint> = input.points.iter().copied().step_by(stride).collect();
         let maps = input.radii2.chunks(input.points.len());
         let radii2: Vec<f32> = maps.flat_map(|map| map.iter().copied().step_by(stride)).collect();
-        let seen = SeenByKernels {
+        let seen = DeviceReceivers {
             points: &points,
             bsdfs: &[],
             radii2: &radii2,

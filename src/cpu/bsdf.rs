@@ -1,7 +1,7 @@
-//! How a surface scatters: evaluate, sample, density.
+//! BSDFs: evaluate, sample, density.
 //!
-//! A BSDF is a sum of layers, each with a share and a normal of its own: a clear coat, what lies below it, and of a surface
-//! that passes a part of the light only both parts. A layer is a [`Reflector`] or [`Glass`].
+//! A BSDF is a sum of layers, each with a weight and a normal: a clear coat, and the surface below it, which has two layers if it
+//! transmits only a part of the light. A layer is a [`Reflector`] or [`Glass`].
 
 use glam::DVec3;
 
@@ -12,7 +12,7 @@ use super::surface::Normals;
 use super::vector::rgb;
 use crate::layout::{DIELECTRIC, FOLLOWED_ALPHA, GLOSSY_SURFACE, MATTE, MIRROR, Material};
 
-/// Which lobes are meant: a camera path ends at wide ones, where photons are gathered, and follows narrow ones.
+/// Wide lobes, where camera paths end and photons are gathered, or narrow lobes, which camera paths follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Width {
     /// Lambertian, and microfacets from [`FOLLOWED_ALPHA`] on.
@@ -34,27 +34,27 @@ struct Layer {
     lobe: Lobe,
 }
 
-/// One of the ways that light can take at a surface.
+/// A sampled direction of one lobe.
 #[derive(Debug, Clone, Copy)]
 pub struct Branch {
-    /// Chance that it is taken, of all ways together.
+    /// Probability of choosing this branch among all branches.
     pub probability: f64,
     /// Unit vector.
     pub direction: DVec3,
-    /// Part of the flux that goes there: BSDF · cos of the layer's normal over the density of the direction, of one lobe. A path that
-    /// takes this branch alone divides by its probability.
+    /// BSDF · cos (to the layer's normal) over the density of the direction, for this lobe alone. A path that follows only this
+    /// branch divides by its probability.
     pub weight: DVec3,
-    /// The layer's.
+    /// The layer's normal.
     pub normal: DVec3,
     /// Of its lobe.
     pub width: Width,
-    /// A mirror's or smooth glass's: no other direction is possible.
+    /// Of a mirror or smooth glass: a delta distribution.
     pub is_delta: bool,
-    /// Through the boundary of a dielectric: index before over that behind it.
+    /// For transmission: refractive index before over that behind the boundary.
     pub passes: Option<f64>,
 }
 
-/// Scattering at a point. Directions are unit vectors away from the surface; `v` is where the path came from.
+/// The BSDF at a point. Directions are unit vectors away from the surface; `v` points to the path's previous vertex.
 #[derive(Debug, Clone)]
 pub struct Bsdf {
     normals: Normals,
@@ -70,7 +70,7 @@ fn width(reflector: &Reflector) -> Width {
     }
 }
 
-/// The lobes of this width: the base is wide, the boundary has its own.
+/// The lobes of this width: the base is wide, the boundary's width depends on its roughness.
 fn lobes_of(reflector: Reflector, of: Width) -> Reflector {
     let base = Reflector {
         f0: DVec3::ZERO,
@@ -85,7 +85,7 @@ fn lobes_of(reflector: Reflector, of: Width) -> Reflector {
     }
 }
 
-/// The part of a surface that passes light.
+/// The fraction of a surface that transmits light.
 fn clear_part(material: &Material) -> f64 {
     match material.surface {
         DIELECTRIC => f64::from(material.transmission) * (1.0 - f64::from(material.metallic)),
@@ -94,7 +94,7 @@ fn clear_part(material: &Material) -> f64 {
 }
 
 impl Bsdf {
-    /// Of a material at a place, with its textures. `outside`: index of refraction; `tint` of what passes.
+    /// From a material with textures applied. `outside`: refractive index on the outer side; `tint`: of transmitted light.
     pub fn new(material: &Material, normals: Normals, outside: f64, tint: DVec3) -> Self {
         let mut layers = Vec::with_capacity(2);
         let mut add = |share: f64, normal: DVec3, lobe: Lobe| {
@@ -106,7 +106,7 @@ impl Bsdf {
         let coat = f64::from(material.coat);
         let mut is_receiver =
             [MATTE, GLOSSY_SURFACE].contains(&material.surface) || (material.surface == DIELECTRIC && clear < 1.0);
-        // The inside of glass has no coat.
+        // A clear coat lies only on the outside of glass.
         if coat > 0.0 && (normals.front || material.surface != DIELECTRIC || material.thin != 0) {
             let coat = Reflector::coat(material);
             is_receiver |= width(&coat) == Width::Wide;
@@ -117,7 +117,7 @@ impl Bsdf {
             MATTE => Reflector::matte(base_color),
             MIRROR => Reflector::mirror(base_color, coat),
             _ => Reflector::glossy(&Material {
-                // Of what isn't clear.
+                // Relative to the part that does not transmit.
                 metallic: (f64::from(material.metallic) / (1.0 - clear).max(1e-10)).min(1.0) as f32,
                 ..*material
             }),
@@ -137,12 +137,12 @@ impl Bsdf {
         self.normals
     }
 
-    /// Whether a camera path can end there: photons land there.
+    /// Whether photons are stored and camera paths can end here.
     pub fn is_receiver(&self) -> bool {
         self.is_receiver
     }
 
-    /// BSDF · cos, 1/sr, of the lobes of this width, for radiance from `l` to `v`; 0 of mirrors and smooth glass.
+    /// BSDF · cos, 1/sr, of the lobes of this width, for radiance from `l` to `v`; 0 for delta lobes.
     pub fn evaluate(&self, of: Width, v: DVec3, l: DVec3) -> DVec3 {
         let above = l.dot(self.normals.geometric) > 0.0;
         let value = |layer: &Layer| match layer.lobe {
@@ -158,15 +158,15 @@ impl Bsdf {
         self.layers.iter().map(|layer| layer.share * value(layer)).sum()
     }
 
-    /// How often each lobe is sampled, up to a factor: base and boundary of each reflector, then all of glass.
+    /// Relative sampling weight of each lobe: base and boundary of a reflector, or all of glass.
     fn importance(&self, layer: &Layer, v: DVec3) -> [f64; 2] {
         match layer.lobe {
             Lobe::Glass(..) => [0.0, layer.share],
             Lobe::Reflector(reflector) => {
                 let nv = layer.normal.dot(v);
-                // What a coat passes at grazing angles shall not be a rare choice.
+                // A lower bound, so that light below a coat at grazing angles is not sampled too rarely.
                 let passes = coat_passes(reflector.coat, nv).max(0.25);
-                // Nor what a boundary mirrors, which may be bright.
+                // The same for reflections, which may be bright.
                 let reflected = reflector.fresnel(nv).max_element().max(0.25 * reflector.f90);
                 let base = reflector.base_albedo() * (1.0 - reflected).max(0.25);
                 [base, reflected].map(|part| layer.share * passes * part)
@@ -174,8 +174,8 @@ impl Bsdf {
         }
     }
 
-    /// Density per solid angle of directions by the [`Self::branches`] of this width, one of them by its probability. Those that
-    /// have none count as 0.
+    /// Density per solid angle with which the [`Self::branches`] of this width are sampled when one is chosen by its probability.
+    /// Branches without a density count as 0.
     pub fn density(&self, of: Width, v: DVec3, l: DVec3) -> f64 {
         let (mut sum, mut all) = (0.0, 0.0);
         let above = l.dot(self.normals.geometric) > 0.0;
@@ -205,7 +205,7 @@ impl Bsdf {
         if all > 0.0 { sum / all } else { 0.0 }
     }
 
-    /// All ways that light from `v` can take, one direction for each. None of what is black.
+    /// One sample of each lobe for light from `v`. Black lobes have none.
     pub fn branches(&self, v: DVec3, u: [f64; 2]) -> Vec<Branch> {
         let geometric = self.normals.geometric;
         let mut branches = Vec::with_capacity(4);
@@ -227,7 +227,7 @@ impl Bsdf {
             };
             match layer.lobe {
                 Lobe::Reflector(reflector) => {
-                    // About the geometric normal, so that photons need no second correction.
+                    // Around the geometric normal, so that photons need no second correction.
                     let direction = cosine_direction(geometric, u[0], u[1]);
                     let over_density = std::f64::consts::PI / direction.dot(geometric).max(1e-20);
                     let diffuse = Reflector {
@@ -257,13 +257,13 @@ impl Bsdf {
                     );
                 }
                 Lobe::Glass(glass, tint) => {
-                    let turns = glass.turns(n, geometric, v, u);
+                    let samples = glass.sample(n, geometric, v, u);
                     let is_delta = glass.is_smooth();
-                    let refracted = turns.refracted.map(|turn| (turn, tint, Some(glass.eta())));
-                    for (turn, tint, passes) in [(turns.reflected, DVec3::ONE, None)].into_iter().chain(refracted) {
+                    let refracted = samples.refracted.map(|sample| (sample, tint, Some(glass.eta())));
+                    for (sample, tint, passes) in [(samples.reflected, DVec3::ONE, None)].into_iter().chain(refracted) {
                         let (probability, weight) =
-                            (boundary * turn.probability, tint * turn.weight * turn.probability);
-                        add(probability, turn.direction, weight, Width::Narrow, is_delta, passes);
+                            (boundary * sample.probability, tint * sample.weight * sample.probability);
+                        add(probability, sample.direction, weight, Width::Narrow, is_delta, passes);
                     }
                 }
             }
@@ -275,7 +275,7 @@ impl Bsdf {
         branches
     }
 
-    /// A direction of the wide lobes, chosen among them by `choice`; `None` where all are black.
+    /// A direction of the wide lobes, chosen among them by `choice`; `None` if all are black.
     pub fn sample_wide(&self, v: DVec3, u: [f64; 2], choice: f64) -> Option<DVec3> {
         let mut branches = self.branches(v, u);
         branches.retain(|branch| branch.width == Width::Wide);
@@ -283,7 +283,7 @@ impl Bsdf {
     }
 }
 
-/// One of some branches, in proportion to their probabilities.
+/// Chooses a branch in proportion to its probability.
 pub fn choose(branches: &[Branch], u: f64) -> Option<Branch> {
     let mut left = u * branches.iter().map(|branch| branch.probability).sum::<f64>();
     let chosen = branches.iter().find(|branch| {

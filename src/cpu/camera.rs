@@ -1,4 +1,4 @@
-//! Camera paths: over mirrors, glass and narrow reflections to their visible points.
+//! Camera paths: through mirrors, glass and narrow lobes to visible points.
 
 use glam::DVec3;
 
@@ -12,7 +12,7 @@ use super::lights::soft_light_along;
 use super::media::{Media, transmittance};
 use super::sampling::disc_point;
 use super::surface::Surface;
-use super::texture::nearest_seen;
+use super::texture::nearest_visible_culled;
 use super::vector::xyz;
 use super::{FAR, Inputs};
 use crate::config::Estimator;
@@ -22,49 +22,49 @@ use crate::random::{CameraTurn, PathKind, Random};
 /// Where a camera path ends: the paper's hitpoint.
 #[derive(Debug, Clone)]
 pub struct VisiblePoint {
-    /// Place.
+    /// Point of the surface.
     pub surface: Surface,
-    /// Its wide lobes gather.
+    /// Photons are gathered with its wide lobes.
     pub bsdf: Bsdf,
-    /// Unit vector to where the path came from.
+    /// Unit vector towards the path's previous vertex.
     pub viewer: DVec3,
-    /// Of what leaves the point, in the pixel.
+    /// Factor from radiance at the point to radiance in the pixel.
     pub throughput: DVec3,
-    /// Side of the pixel there, render units.
+    /// Side of the pixel's footprint there, in render units.
     pub footprint: f64,
 }
 
-/// What a path, with its branches, has found.
+/// Result of a camera path with all its branches.
 #[derive(Debug, Clone, Default)]
 pub struct CameraPath {
-    /// Radiance that it saw by itself.
+    /// Emission along the path, in radiance.
     pub emitted: DVec3,
-    /// Whether it met a surface.
+    /// Whether the path hit a surface.
     pub met: bool,
-    /// Where it ends: as many as there is room for.
+    /// Visible points, at most one per slot of the pixel.
     pub points: Vec<VisiblePoint>,
-    /// Branches that the bounce limit ended.
+    /// Branches ended by the bounce limit.
     pub truncated: u64,
 }
 
-/// A part of a path that is still to be followed.
+/// A path segment that has not been traced yet.
 #[derive(Clone, Copy)]
 struct Segment {
     ray: Ray,
     throughput: DVec3,
-    way: f64,
+    distance: f64,
     depth: u32,
     ignored: Option<PlacedTriangle>,
     media: Media,
-    /// Of its light, nm.
+    /// Wavelength in nm, after dispersion.
     wavelength: Option<f64>,
-    /// No ray to a light has been asked instead of this one.
+    /// Whether the segment adds the emission of lights with an extent. False where direct lighting has sampled them.
     sees_lights: bool,
 }
 
-/// The ray through a place of a pixel, both parts in [0, 1) from its upper left corner, and of the lens.
+/// The ray through a position in a pixel (in [0, 1)², from its upper left corner) and a point of the lens.
 fn camera_ray(settings: &Settings, pixel: [u32; 2], place: [f64; 2], lens: [f64; 4]) -> Ray {
-    // −1 to 1 from left to right and from top to bottom.
+    // −1 to 1, from left to right and from top to bottom.
     let film = |axis: usize| (f64::from(pixel[axis]) + place[axis]) / f64::from(settings.resolution[axis]) * 2.0 - 1.0;
     let (right, up) = (xyz(settings.camera_right), xyz(settings.camera_up));
     let on_film = film(0) * right - film(1) * up;
@@ -73,7 +73,7 @@ fn camera_ray(settings: &Settings, pixel: [u32; 2], place: [f64; 2], lens: [f64;
     *(if is_parallel { &mut origin } else { &mut direction }) += on_film;
     let radius = f64::from(settings.camera_position[3]);
     if radius > 0.0 {
-        // All rays of a place in the picture meet where it is in focus.
+        // All rays through one point of the image meet at the focal distance.
         let on_lens = radius * disc_point(lens[0], lens[1]);
         let off_axis = on_lens.x * right.normalize() + on_lens.y * up.normalize();
         origin += off_axis;
@@ -85,9 +85,9 @@ fn camera_ray(settings: &Settings, pixel: [u32; 2], place: [f64; 2], lens: [f64;
     }
 }
 
-/// Follows one of an iteration's paths of a pixel. Where it can go several ways it goes all of them as long as there is room for
-/// so many visible points, and then one by chance.
-pub fn trace_camera_path(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, room: usize) -> CameraPath {
+/// Traces one camera path of a pixel. At a surface with several lobes the path splits while the pixel has slots for all its
+/// visible points; after that one lobe is chosen at random.
+pub fn trace_camera_path(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn, pixel_slots: usize) -> CameraPath {
     let settings = inputs.settings;
     let number = pixel[1] * settings.resolution[0] + pixel[0];
     let mut random = Random::of_pixel(inputs.config, PathKind::Camera, number, turn);
@@ -102,7 +102,7 @@ pub fn trace_camera_path(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn,
     let mut pending = vec![Segment {
         ray: camera_ray(settings, pixel, place, lens),
         throughput: DVec3::ONE,
-        way: 0.0,
+        distance: 0.0,
         depth: 0,
         ignored: None,
         media: Media::of(settings.camera_media),
@@ -110,7 +110,7 @@ pub fn trace_camera_path(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn,
         sees_lights: true,
     }];
     while let Some(mut segment) = pending.pop() {
-        let Some(met) = meet(inputs, &mut segment, &mut path, &mut random) else {
+        let Some(met) = next_interaction(inputs, &mut segment, &mut path, &mut random) else {
             continue;
         };
         let (viewer, bsdf) = (-segment.ray.direction, met.bsdf(segment.wavelength));
@@ -123,31 +123,31 @@ pub fn trace_camera_path(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn,
             let seen = narrow_reflection_of_lights(inputs, &met, &bsdf, viewer, &random);
             path.emitted += segment.throughput * seen;
         }
-        // To end there, or to go on.
+        // End the path here, or continue it.
         let (wide, narrow): (Vec<Branch>, Vec<Branch>) =
             branches.into_iter().partition(|branch| branch.width == Width::Wide);
-        let ends: f64 = wide.iter().map(|branch| branch.probability).sum();
-        let mut ways: Vec<(f64, Option<Branch>)> = narrow
+        let end_probability: f64 = wide.iter().map(|branch| branch.probability).sum();
+        let mut choices: Vec<(f64, Option<Branch>)> = narrow
             .into_iter()
             .map(|branch| (branch.probability, Some(branch)))
             .collect();
-        if ends > 0.0 {
-            ways.insert(0, (ends, None));
+        if end_probability > 0.0 {
+            choices.insert(0, (end_probability, None));
         }
-        let splits = path.points.len() + pending.len() + ways.len() <= room;
+        let splits = path.points.len() + pending.len() + choices.len() <= pixel_slots;
         if !splits {
             let mut sum = 0.0;
-            let chosen = ways.iter().position(|(probability, _)| {
+            let chosen = choices.iter().position(|(probability, _)| {
                 sum += probability;
                 choice < sum
             });
-            ways = ways
-                .get(chosen.unwrap_or(ways.len().saturating_sub(1)))
+            choices = choices
+                .get(chosen.unwrap_or(choices.len().saturating_sub(1)))
                 .copied()
                 .into_iter()
                 .collect();
         }
-        for (probability, branch) in ways {
+        for (probability, branch) in choices {
             let throughput = segment.throughput / if splits { 1.0 } else { probability };
             let Some(branch) = branch else {
                 path.points.push(VisiblePoint {
@@ -155,11 +155,11 @@ pub fn trace_camera_path(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn,
                     bsdf: bsdf.clone(),
                     viewer,
                     throughput,
-                    footprint: footprint(settings, segment.way),
+                    footprint: footprint(settings, segment.distance),
                 });
                 continue;
             };
-            // Radiance is compressed on its way into the denser medium: Veach, 1997, section 5.2.
+            // Radiance scales with the square of the refractive index: Veach, 1997, section 5.2.
             let throughput = throughput * branch.weight * branch.passes.map_or(1.0, |eta| eta * eta);
             if segment.depth + 1 >= settings.max_depth {
                 path.truncated += 1;
@@ -186,16 +186,21 @@ pub fn trace_camera_path(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn,
     path
 }
 
-fn footprint(settings: &Settings, way: f64) -> f64 {
+fn footprint(settings: &Settings, distance: f64) -> f64 {
     let is_parallel = settings.camera_up[3] != 0.0;
-    f64::from(settings.pixel_spread) * if is_parallel { 1.0 } else { way }
+    f64::from(settings.pixel_spread) * if is_parallel { 1.0 } else { distance }
 }
 
-/// What a segment meets, and what it sees by itself on its way there and of it.
-fn meet(inputs: &Inputs<'_>, segment: &mut Segment, path: &mut CameraPath, random: &mut Random) -> Option<Interaction> {
+/// The next surface interaction of a segment. Adds the emission along the segment and at its end.
+fn next_interaction(
+    inputs: &Inputs<'_>,
+    segment: &mut Segment,
+    path: &mut CameraPath,
+    random: &mut Random,
+) -> Option<Interaction> {
     let culls = segment.depth == 0;
     loop {
-        let hit = nearest_seen(inputs, segment.ray, FAR, segment.ignored, culls, random);
+        let hit = nearest_visible_culled(inputs, segment.ray, FAR, segment.ignored, culls, random);
         let end = hit.map_or(FAR, |hit| hit.t);
         if segment.sees_lights {
             let seen = soft_lights_along(inputs, segment.ray, end, segment.media);
@@ -203,12 +208,12 @@ fn meet(inputs: &Inputs<'_>, segment: &mut Segment, path: &mut CameraPath, rando
         }
         let incoming = segment.ray.direction;
         let Some(hit) = hit else {
-            let sky = Environment::of(&inputs.scene.environment).at(incoming);
-            path.emitted += segment.throughput * sky.radiance;
+            let environment = Environment::of(&inputs.scene.environment).at(incoming);
+            path.emitted += segment.throughput * environment.radiance;
             return None;
         };
         let met = Interaction::new(inputs, hit, incoming, segment.media, culls, random);
-        segment.way += hit.t;
+        segment.distance += hit.t;
         segment.throughput *= transmittance(inputs, met.through, hit.t);
         if met.hidden {
             segment.throughput *= met.tint;
@@ -225,12 +230,12 @@ fn meet(inputs: &Inputs<'_>, segment: &mut Segment, path: &mut CameraPath, rando
     }
 }
 
-/// Radiance of lights with an extent that a ray along a unit vector meets within `end`.
+/// Radiance of the lights with an extent that a ray (a unit vector) hits before `end`.
 fn soft_lights_along(inputs: &Inputs<'_>, ray: Ray, end: f64, media: Media) -> DVec3 {
     let lights = inputs.scene.lights.iter().filter(|_| inputs.scene.features.soft);
     let met = lights.filter_map(|light| {
-        let (radiance, way) = soft_light_along(light, ray)?;
-        (way < end || end >= FAR).then(|| radiance * transmittance(inputs, media, way))
+        let (radiance, distance) = soft_light_along(light, ray)?;
+        (distance < end || end >= FAR).then(|| radiance * transmittance(inputs, media, distance))
     });
     met.sum()
 }

@@ -1,26 +1,26 @@
-//! Which points of the disc around a visible point can have photons, and whether anything is around it.
+//! Coverage: which part of the disc around a visible point can receive photons, and whether any surface surrounds the point.
 
 use glam::DVec3;
 
 use super::intersect::{Progress, Ray, nearest_hit, nearest_hit_from};
 use super::sampling::{basis, cosine_direction, disc_point};
 use super::surface::{Surface, surface_of};
-use super::texture::share_there;
+use super::texture::opacity;
 use super::{FAR, Inputs};
 use crate::layout::{BACKED, COINCIDENT, COVERAGE_CROSSINGS, DIELECTRIC, MATTE, SEE_THROUGH};
 
-/// A visible point as coverage is asked for there.
+/// A visible point whose coverage is sampled.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
-    /// Where rays leave it along [`Self::normal`].
+    /// Ray origin on the side of [`Self::normal`].
     pub origin: DVec3,
-    /// Geometric, on the side that is seen.
+    /// Geometric normal on the visible side.
     pub normal: DVec3,
-    /// Photons count on this object alone.
+    /// Only photons on this object count.
     pub object: u32,
 }
 
-/// The side of an object that a ray meets.
+/// The side of an object that a ray hits.
 #[derive(Clone, Copy)]
 struct Side {
     object: u32,
@@ -36,8 +36,8 @@ impl Side {
     }
 }
 
-/// Whether the point of a disc that `u` chooses can have photons: not past the edge of the object, nor inside an opaque one that
-/// stands on it.
+/// Whether the point of the disc chosen by `u` can receive photons. It cannot beyond the edge of the object, or inside an opaque
+/// object that stands on it.
 pub fn can_have_photons(inputs: &Inputs<'_>, place: Place, radius: f64, u: [f64; 2]) -> bool {
     let Place { origin, normal, object } = place;
     let along = basis(normal) * (radius * disc_point(u[0], u[1])).extend(0.0);
@@ -55,7 +55,7 @@ pub fn can_have_photons(inputs: &Inputs<'_>, place: Place, radius: f64, u: [f64;
         if surface.object == object {
             return true; // the surface bends up
         }
-        // Light passes glass, and what isn't there everywhere.
+        // Light passes glass and partly transparent surfaces.
         if surface.material.surface != DIELECTRIC && surface.flags & SEE_THROUGH == 0 {
             let side = Side::of(&surface, along);
             entered = if entered.is_none() { Some(side) } else { None };
@@ -63,7 +63,7 @@ pub fn can_have_photons(inputs: &Inputs<'_>, place: Place, radius: f64, u: [f64;
         progress = Progress::past(hit);
         ignored = Some(hit.at);
     }
-    // An open sheet has been crossed, but encloses nothing.
+    // An open surface has been crossed, but it encloses nothing.
     let leaves = |direction: DVec3, entered: Side| {
         let ray = Ray {
             origin: origin + along,
@@ -77,7 +77,7 @@ pub fn can_have_photons(inputs: &Inputs<'_>, place: Place, radius: f64, u: [f64;
     if entered.is_some_and(|entered| leaves(along, entered) && leaves(normal, entered)) {
         return false;
     }
-    // Then down: it may bend, but it must be there, under glass that lies on it and other faces in its place too.
+    // Then down: the surface may bend, but it must exist, also below glass that lies on it and coincident faces.
     let down = Ray {
         origin: origin + along,
         direction: -radius * normal,
@@ -87,12 +87,12 @@ pub fn can_have_photons(inputs: &Inputs<'_>, place: Place, radius: f64, u: [f64;
         let Some(hit) = nearest_hit_from(inputs, down, progress, 1.0, None) else {
             return false;
         };
-        let there = surface_of(inputs.scene, hit);
-        if there.object == object {
-            return share_there(inputs.scene, &there) > 0.0;
+        let below = surface_of(inputs.scene, hit);
+        if below.object == object {
+            return opacity(inputs.scene, &below) > 0.0;
         }
-        let lies_on = there.flags & (COINCIDENT | BACKED) != 0;
-        if !(lies_on || (inputs.scene.features.coincident_interfaces && there.material.surface == DIELECTRIC)) {
+        let lies_on = below.flags & (COINCIDENT | BACKED) != 0;
+        if !(lies_on || (inputs.scene.features.coincident_interfaces && below.material.surface == DIELECTRIC)) {
             return false;
         }
         progress = Progress::past(hit);
@@ -100,7 +100,7 @@ pub fn can_have_photons(inputs: &Inputs<'_>, place: Place, radius: f64, u: [f64;
     false
 }
 
-/// Whether a ray meets something, past glass, that may scatter light or mirror it.
+/// Whether a ray hits a surface, possibly behind glass, that can scatter or reflect light.
 pub fn is_surrounded(inputs: &Inputs<'_>, place: Place, u: [f64; 2]) -> bool {
     let direction = cosine_direction(place.normal, u[0], u[1]);
     let ray = Ray {

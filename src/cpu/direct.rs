@@ -1,6 +1,6 @@
-//! Direct light at a visible point, by points of lights and by directions of the BSDF together (multiple importance sampling by
-//! the balance heuristic: Veach, 1997, section 9.2). Where glass alone stands between, photons have to bring that light: what it
-//! would be unbent is kept apart.
+//! Direct lighting at a visible point: light samples and BSDF samples, combined by multiple importance sampling with the balance
+//! heuristic (Veach, 1997, section 9.2). Light that arrives through glass is left to photons. Its unrefracted estimate is
+//! returned separately.
 
 use glam::{DVec2, DVec3};
 
@@ -9,7 +9,7 @@ use super::camera::VisiblePoint;
 use super::environment::Environment;
 use super::interaction::Interaction;
 use super::intersect::{Hit, PlacedTriangle, Ray};
-use super::lights::{met_emitter, punctual, sample_incident};
+use super::lights::{hit_emitter, punctual, sample_incident};
 use super::media::{Media, transmittance};
 use super::surface::surface_of;
 use super::texture::nearest_visible;
@@ -22,17 +22,17 @@ use crate::layout::{
 };
 use crate::random::Random;
 
-/// What lights bring.
+/// Direct light at a visible point.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DirectLight {
     /// Radiance in the pixel.
     pub radiance: DVec3,
-    /// Of what stands behind glass, mean of the channels, if glass didn't bend it.
+    /// Radiance (mean of the channels) of lights behind glass, if the glass did not refract.
     pub unbent: f64,
 }
 
 impl DirectLight {
-    /// `tint`: of glass on the way.
+    /// `tint`: of the glass that the ray passed, if any.
     fn add(&mut self, radiance: DVec3, tint: Option<DVec3>) {
         match tint {
             None => self.radiance += radiance,
@@ -41,8 +41,14 @@ impl DirectLight {
     }
 }
 
-/// Samples each source of light once, and the BSDF once for all. Unless it `asks`, what glass stands before counts as dark.
-pub fn direct_light(inputs: &Inputs<'_>, point: &VisiblePoint, asks: bool, random: &mut Random) -> DirectLight {
+/// Takes one light sample from each light source, and one BSDF sample. Without `through_glass`, lights behind glass are not
+/// counted.
+pub fn direct_light(
+    inputs: &Inputs<'_>,
+    point: &VisiblePoint,
+    through_glass: bool,
+    random: &mut Random,
+) -> DirectLight {
     let VisiblePoint {
         surface, bsdf, viewer, ..
     } = point;
@@ -62,17 +68,25 @@ pub fn direct_light(inputs: &Inputs<'_>, point: &VisiblePoint, asks: bool, rando
         let density = sample.density.map_or(probability, |density| {
             density * probability + bsdf.density(Width::Wide, viewer, sample.towards)
         });
-        let brings = response(sample.towards) * sample.radiance / density;
-        if leaves(sample.ray.direction) && brings.max_element() > 0.0 {
-            let seen = look(inputs, sample.ray, sample.end, sample.ignored, asks, false, random);
-            if seen.hit.is_none() {
-                light.add(brings, seen.tint);
+        let contribution = response(sample.towards) * sample.radiance / density;
+        if leaves(sample.ray.direction) && contribution.max_element() > 0.0 {
+            let traced = trace_through_glass(
+                inputs,
+                sample.ray,
+                sample.end,
+                sample.ignored,
+                through_glass,
+                false,
+                random,
+            );
+            if traced.hit.is_none() {
+                light.add(contribution, traced.tint);
             }
         }
     }
 
-    let is_met = |source: &LightSource| [TRIANGLE_LIGHT, ENVIRONMENT_LIGHT].contains(&source.kind);
-    if !inputs.scene.light_sources.iter().any(is_met) {
+    let can_be_hit = |source: &LightSource| [TRIANGLE_LIGHT, ENVIRONMENT_LIGHT].contains(&source.kind);
+    if !inputs.scene.light_sources.iter().any(can_be_hit) {
         return light;
     }
     let [u, v, choice, _] = random.next4();
@@ -86,27 +100,28 @@ pub fn direct_light(inputs: &Inputs<'_>, point: &VisiblePoint, asks: bool, rando
         origin: origin(direction),
         direction,
     };
-    let seen = look(inputs, ray, FAR, None, asks, true, random);
-    let of_bsdf = bsdf.density(Width::Wide, viewer, direction);
-    let brings = |radiance: DVec3, of_light: f64| response(direction) * radiance / (of_light + of_bsdf);
-    let Some(hit) = seen.hit else {
-        // The environment is the last light, if it is one.
-        let sky = Environment::of(&inputs.scene.environment).at(direction);
+    let traced = trace_through_glass(inputs, ray, FAR, None, through_glass, true, random);
+    let bsdf_density = bsdf.density(Width::Wide, viewer, direction);
+    let contribution =
+        |radiance: DVec3, light_density: f64| response(direction) * radiance / (light_density + bsdf_density);
+    let Some(hit) = traced.hit else {
+        // The environment, if there is one, is the last light.
+        let environment = Environment::of(&inputs.scene.environment).at(direction);
         if inputs.scene.features.environment {
-            light.add(brings(sky.radiance, sky.density), seen.tint);
+            light.add(contribution(environment.radiance, environment.density), traced.tint);
         }
         return light;
     };
     let emitter = Interaction::new(inputs, hit, direction, Media::VACUUM, false, random).surface;
     if emitter.light != NO_LIGHT
-        && let Some((radiance, density)) = met_emitter(inputs, &emitter, surface.position)
+        && let Some((radiance, density)) = hit_emitter(inputs, &emitter, surface.position)
     {
-        light.add(brings(radiance, density), seen.tint);
+        light.add(contribution(radiance, density), traced.tint);
     }
     light
 }
 
-/// What narrow lobes show of lights without surface, which no direction of theirs meets.
+/// Reflection of delta lights by narrow lobes, which BSDF samples never hit.
 pub fn narrow_reflection_of_lights(
     inputs: &Inputs<'_>,
     met: &Interaction,
@@ -124,48 +139,49 @@ pub fn narrow_reflection_of_lights(
         let towards = direction.normalize();
         let above = towards.dot(met.normals.geometric) > 0.0;
         let medium = if above { met.through } else { met.beyond };
-        let way = if light.kind == DIRECTIONAL_LIGHT {
+        let distance = if light.kind == DIRECTIONAL_LIGHT {
             FAR
         } else {
             direction.length()
         };
-        let brings = bsdf.evaluate(Width::Narrow, viewer, towards) * irradiance * transmittance(inputs, medium, way);
+        let contribution =
+            bsdf.evaluate(Width::Narrow, viewer, towards) * irradiance * transmittance(inputs, medium, distance);
         let ray = Ray { origin, direction };
-        if brings.max_element() > 0.0 && nearest_visible(inputs, ray, end, None, random).is_none() {
-            sum += brings;
+        if contribution.max_element() > 0.0 && nearest_visible(inputs, ray, end, None, random).is_none() {
+            sum += contribution;
         }
     }
     sum
 }
 
-/// What a ray meets, beyond glass that it has asked through.
-struct Seen {
+/// Result of [`trace_through_glass`].
+struct ThroughGlass {
     hit: Option<Hit>,
-    /// The glass's colours, where there is any.
+    /// Product of the glass's colours, if the ray passed any.
     tint: Option<DVec3>,
 }
 
-/// Follows a ray through glass as if that didn't bend it; where `lights_end_it`, to the first surface of a light. Unless it `asks`,
-/// it ends on glass.
-fn look(
+/// Traces a ray through glass without refraction. With `stops_at_lights` it stops at the first emissive surface. Without
+/// `through_glass` it stops at glass.
+fn trace_through_glass(
     inputs: &Inputs<'_>,
     ray: Ray,
     end: f64,
     ignored: Option<PlacedTriangle>,
-    asks: bool,
-    lights_end_it: bool,
+    through_glass: bool,
+    stops_at_lights: bool,
     random: &Random,
-) -> Seen {
+) -> ThroughGlass {
     let (mut from, mut tint, mut crossings) = (ray, None, 0);
     loop {
         let passed = (from.origin - ray.origin).dot(ray.direction) / ray.direction.length_squared();
         let hit = nearest_visible(inputs, from, end - passed, ignored, random);
         let met = hit.map(|hit| surface_of(inputs.scene, hit)).filter(|met| {
-            let is_light = lights_end_it && met.light != NO_LIGHT;
-            asks && crossings < DIRECT_CROSSINGS && met.material.surface == DIELECTRIC && !is_light
+            let is_light = stops_at_lights && met.light != NO_LIGHT;
+            through_glass && crossings < DIRECT_CROSSINGS && met.material.surface == DIELECTRIC && !is_light
         });
         let Some(met) = met else {
-            return Seen { hit, tint };
+            return ThroughGlass { hit, tint };
         };
         tint = Some(tint.unwrap_or(DVec3::ONE) * rgb(met.material.base_color));
         from.origin = met.origin_towards(ray.direction);

@@ -1,11 +1,11 @@
-//! Light of one wavelength. `glsl/bsdf/dispersion.glsl` cites the sources.
+//! Spectral dispersion. `glsl/bsdf/dispersion.glsl` cites the sources.
 
 use glam::{DVec3, dvec3};
 
 use crate::layout::{DIELECTRIC, LONGEST_WAVELENGTH, Material, SHORTEST_WAVELENGTH};
 use crate::random::Random;
 
-/// The part of a wavelength in linear sRGB, whose mean over all is 1 for each channel.
+/// A wavelength's linear sRGB colour; the mean over all wavelengths is 1 in each channel.
 fn color_of(wavelength: f64) -> DVec3 {
     let lobe = |centre: f64, left: f64, right: f64| {
         let t = (wavelength - centre) * if wavelength < centre { left } else { right };
@@ -30,7 +30,7 @@ pub fn ior_at(material: &Material, wavelength: f64) -> f64 {
     (ior + spread * (0.523_655 / (micrometres * micrometres) - 1.5168)).max(1.0)
 }
 
-/// Gives a path that meets its first dispersive material a wavelength (nm). Returns the factor of the path's throughput.
+/// Chooses a wavelength (nm) at a path's first dispersive material. Returns a factor of the path's throughput.
 pub fn disperse(material: &Material, wavelength: &mut Option<f64>, random: &mut Random) -> DVec3 {
     if wavelength.is_some() || material.surface != DIELECTRIC || material.dispersion <= 0.0 {
         return DVec3::ONE;

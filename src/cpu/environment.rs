@@ -1,4 +1,4 @@
-//! What shines from afar: `glsl/lights/environment.glsl` in f64.
+//! The environment light: `glsl/lights/environment.glsl` in f64.
 
 use std::f64::consts::PI;
 
@@ -6,21 +6,21 @@ use glam::DVec3;
 
 use super::vector::xyz;
 
-/// Radiance from a direction.
+/// Radiance from a direction, with the direction's sampling density.
 #[derive(Debug, Clone, Copy)]
-pub struct Sky {
+pub struct EnvironmentSample {
     /// Linear RGB.
     pub radiance: DVec3,
-    /// By which [`Environment::sample`] chooses it, per solid angle.
+    /// Density of [`Environment::sample`], per solid angle.
     pub density: f64,
 }
 
-/// The picture and its probabilities: see [`crate::scene::Environment`].
+/// The image and its sampling tables; see [`crate::scene::Environment`].
 #[derive(Debug, Clone, Copy)]
 pub struct Environment<'a> {
     width: usize,
     height: usize,
-    /// About +Y, in turns.
+    /// Rotation about +Y, in full turns.
     rotation: f64,
     /// Cosines at the upper and the lower edge, unused, cumulative probability.
     rows: &'a [[f32; 4]],
@@ -29,7 +29,7 @@ pub struct Environment<'a> {
 }
 
 impl<'a> Environment<'a> {
-    /// Reads [`crate::packing::PackedScene::environment`].
+    /// From [`crate::packing::PackedScene::environment`].
     pub fn of(table: &'a [[f32; 4]]) -> Self {
         let [width, height] = [0, 1].map(|side| table[0][side].to_bits() as usize);
         let (rows, pixels) = table[1..].split_at(height);
@@ -42,8 +42,8 @@ impl<'a> Environment<'a> {
         }
     }
 
-    /// A direction, nearly in proportion to the radiance from there, and that; uniform within a pixel.
-    pub fn sample(&self, u: f64, v: f64) -> (DVec3, Sky) {
+    /// Samples a direction nearly in proportion to its radiance; uniform within a pixel.
+    pub fn sample(&self, u: f64, v: f64) -> (DVec3, EnvironmentSample) {
         let (row, in_row) = choose(self.rows, v);
         let (column, in_column) = choose(self.row(row), u);
         let [upper, lower, ..] = self.rows[row].map(f64::from);
@@ -52,21 +52,21 @@ impl<'a> Environment<'a> {
         let turn = column as f64 + in_column;
         let phi = 2.0 * PI * (turn / self.width as f64 - 0.5 - self.rotation);
         let direction = DVec3::new(-across * phi.sin(), up, across * phi.cos()).normalize();
-        let sky = Sky {
+        let sample = EnvironmentSample {
             radiance: self.radiance(turn, self.rows_below_pole(across, up)),
             density: self.density(column, row),
         };
-        (direction, sky)
+        (direction, sample)
     }
 
-    /// What comes from a direction, a unit vector.
-    pub fn at(&self, direction: DVec3) -> Sky {
+    /// Radiance from a direction (a unit vector), with its density.
+    pub fn at(&self, direction: DVec3) -> EnvironmentSample {
         let turn = (0.5 + (-direction.x).atan2(direction.z) / (2.0 * PI) + self.rotation).rem_euclid(1.0);
         let x = turn * self.width as f64;
         let y = self.rows_below_pole(direction.x.hypot(direction.z), direction.y);
         let column = (x as usize).min(self.width - 1);
         let row = (y as usize).min(self.height - 1);
-        Sky {
+        EnvironmentSample {
             radiance: self.radiance(x, y),
             density: self.density(column, row),
         }
@@ -76,7 +76,7 @@ impl<'a> Environment<'a> {
         across.atan2(up) / PI * self.height as f64
     }
 
-    /// At a place in the picture, in pixels: between the four nearest centres.
+    /// Bilinear interpolation at a position in pixels.
     fn radiance(&self, x: f64, y: f64) -> DVec3 {
         let (left, upper) = ((x - 0.5).floor(), (y - 0.5).floor());
         let column_at = |x: f64| x.rem_euclid(self.width as f64) as usize;
@@ -89,7 +89,7 @@ impl<'a> Environment<'a> {
         in_row(upper).lerp(in_row(upper + 1.0), y - 0.5 - upper)
     }
 
-    /// By which [`Environment::sample`] chooses a pixel's directions, per solid angle.
+    /// Density of [`Environment::sample`] in a pixel, per solid angle.
     fn density(&self, column: usize, row: usize) -> f64 {
         let [upper, lower, ..] = self.rows[row].map(f64::from);
         let solid_angle = 2.0 * PI / self.width as f64 * (upper - lower);
@@ -101,12 +101,12 @@ impl<'a> Environment<'a> {
     }
 }
 
-/// The entry that u in [0, 1) chooses, and how far u lies into its part.
+/// The entry that u in [0, 1) chooses, and the relative position of u within it.
 fn choose(entries: &[[f32; 4]], u: f64) -> (usize, f64) {
     let index = entries
         .partition_point(|entry| f64::from(entry[3]) <= u)
         .min(entries.len() - 1);
-    // In the middle of what the number's last bit stands for.
+    // The middle of the interval that the number's last bit covers.
     let half_a_step = 0.5 / f64::from(1 << 24);
     (
         index,
@@ -129,8 +129,8 @@ mod tests {
     use crate::random::{PathKind, Random};
     use crate::scene;
 
-    /// The densities of all directions integrate to 1, and directions are chosen by them: so means of radiance over density
-    /// are integrals of radiance.
+    /// The density integrates to 1 over all directions, and directions are sampled with it: the mean of radiance over density is
+    /// the integral of radiance.
     #[test]
     fn directions_are_chosen_by_their_density() {
         for degrees in [0.0, 123.0] {
@@ -149,24 +149,24 @@ mod tests {
         let (mut density, mut squares) = (0.0, DVec3::ZERO);
         for path in 0..count {
             let [u, v, s, t] = Random::new(PathKind::Photon, path, 0, 0).next4();
-            let (direction, sky) = environment.sample(u, v);
+            let (direction, sample) = environment.sample(u, v);
             let looked_up = environment.at(direction);
             assert!(
-                (sky.radiance - looked_up.radiance).length() < 1e-6 * (1.0 + sky.radiance.length()),
+                (sample.radiance - looked_up.radiance).length() < 1e-6 * (1.0 + sample.radiance.length()),
                 "{direction}"
             );
-            let estimate = sky.radiance / sky.density;
+            let estimate = sample.radiance / sample.density;
             sampled += estimate / f64::from(count);
             squares += estimate * estimate / f64::from(count);
-            // Every direction as often.
+            // A uniform direction.
             let y = 1.0 - 2.0 * s;
             let (sin, cos) = (2.0 * PI * t).sin_cos();
             let across = (1.0 - y * y).sqrt();
-            let sky = environment.at(DVec3::new(across * cos, y, across * sin));
-            uniform += 4.0 * PI * sky.radiance / f64::from(count);
-            density += 4.0 * PI * sky.density / f64::from(count);
+            let sample = environment.at(DVec3::new(across * cos, y, across * sin));
+            uniform += 4.0 * PI * sample.radiance / f64::from(count);
+            density += 4.0 * PI * sample.density / f64::from(count);
         }
-        // The second channel is 1 everywhere. Six standard errors fail a right program once in 10⁸ times.
+        // The second channel is 1 everywhere. Six standard errors: a correct program fails once in 10⁸ runs.
         let errors = ((squares - sampled * sampled) / f64::from(count)).map(f64::sqrt);
         assert!((sampled.y - 4.0 * PI).abs() < 6.0 * errors.y, "{sampled} ± {errors}");
         // The density is below 2000 / 4π, and its integral is 1.

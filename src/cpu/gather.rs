@@ -1,4 +1,5 @@
-//! The photons within each visible point's radius: by testing each, and by a kd-tree as the paper's CPU version.
+//! Gathering photons within the radius of each visible point: by testing all of them, or with a k-d tree (the paper's CPU
+//! version).
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -9,52 +10,51 @@ use super::vector::{mean, word, xyz};
 use crate::kd_tree::KdTree;
 use crate::layout::{CAUSTIC, NO_OBJECT, PackedBsdf, Photon, VisiblePoint};
 
-/// How much farther than R the kd-tree is asked: more than the rounding of the squared distance, which the tree and
-/// the predicate sum up differently.
+/// The k-d tree's search radius relative to R². Its rounding of the squared distance differs from that of the exact test.
 const MARGIN: f32 = 1.0 + 1e-5;
 
-/// What a visible point accepted. Thousands of f32 of like size add up in f64 without rounding, so the order in which
-/// photons are found doesn't matter.
+/// Photons that a visible point accepted. Thousands of f32 of similar size are summed in f64 without rounding, so the order of
+/// the photons does not matter.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Gathered {
-    /// Σ flux, or what of it goes to the viewer.
+    /// Σ flux; with a glossy BSDF, the part that is scattered towards the viewer.
     pub flux: DVec3,
     /// M.
     pub count: u32,
-    /// Σ flux · distance², flux as the mean of its channels.
+    /// Σ flux · distance², with the mean of the flux's channels.
     pub moment: f64,
 }
 
 impl Gathered {
-    /// Adds another part of the iteration's photons.
+    /// Adds another batch of the iteration's photons.
     pub fn add(&mut self, other: &Self) {
         self.flux += other.flux;
         self.count += other.count;
         self.moment += other.moment;
     }
 
-    /// Σ flux · (1 − 2 distance²/R²), flux as the mean of its channels: 0 on average where photons lie evenly.
+    /// Σ flux · (1 − 2 distance²/R²), with the mean of the channels: 0 on average where the photon density is uniform.
     pub fn curvature(&self, radius2: f64) -> f64 {
         mean(self.flux) - 2.0 * self.moment / radius2
     }
 }
 
-/// Where photons are accepted.
+/// A disc that accepts photons.
 #[derive(Debug, Clone, Copy)]
 pub struct Receiver {
-    /// As photons have it.
+    /// In the same precision as the photons' positions.
     pub position: [f32; 3],
     /// R².
     pub radius2: f32,
-    /// Object, and [`CAUSTIC`] of such photons' map.
+    /// Object, with [`CAUSTIC`] for the map of caustic photons.
     pub object: u32,
-    /// On the side that is seen.
+    /// On the visible side.
     pub normal: DVec3,
 }
 
 impl Receiver {
-    /// The squared distance of a photon within R, on the same object, that arrives on the side that is seen. It is rounded to f32
-    /// at each step as in the kernels, so that both count the same photons.
+    /// The squared distance of a photon within R on the same object that arrives on the visible side. It is rounded to f32 at
+    /// each step like in the kernels, so that both accept the same photons.
     fn accepts(&self, photon: &Photon, arriving: DVec3) -> Option<f32> {
         let here = position(photon);
         let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| here[axis] - self.position[axis]);
@@ -64,28 +64,28 @@ impl Receiver {
     }
 }
 
-/// All that gather.
+/// All receivers of an image.
 pub trait Receivers: Sync {
-    /// How many there may be.
+    /// Number of slots.
     fn count(&self) -> usize;
-    /// One of them; `None` where a path has no visible point.
+    /// The receiver in a slot; `None` where a path has no visible point.
     fn receiver(&self, index: usize) -> Option<Receiver>;
-    /// Factor of the flux of a photon that comes from `l`.
+    /// Factor of the flux of a photon that arrives from `l`.
     fn response(&self, index: usize, l: DVec3) -> DVec3;
 }
 
-/// The kernels' visible points; R² of each, all slots of one photon map, then those of the next.
+/// Visible points made by the kernels; R² of all slots of the first photon map, then of the next.
 #[derive(Debug, Clone, Copy)]
-pub struct SeenByKernels<'a> {
+pub struct DeviceReceivers<'a> {
     /// Visible points.
     pub points: &'a [VisiblePoint],
-    /// How they scatter; empty where the scene has no glossy surfaces.
+    /// Their BSDFs; empty if the scene has no glossy surfaces.
     pub bsdfs: &'a [PackedBsdf],
     /// R².
     pub radii2: &'a [f32],
 }
 
-impl Receivers for SeenByKernels<'_> {
+impl Receivers for DeviceReceivers<'_> {
     fn count(&self) -> usize {
         self.radii2.len()
     }
@@ -108,7 +108,7 @@ impl Receivers for SeenByKernels<'_> {
         self.bsdfs.get(slot).map_or(DVec3::ONE, |packed| {
             let (reflector, viewer, coated) = Reflector::of_packed(packed);
             let normal = decode_direction(word(self.points[slot].emitted_normal));
-            // Photons on coated objects have their flux across their rays, since each layer has a normal of its own.
+            // Flux on coated objects is per area across the ray, because each layer has its own normal.
             let cosine = if coated { l.dot(normal).max(0.0) } else { 1.0 };
             reflector.brdf(normal, viewer, l) * cosine
         })
@@ -120,7 +120,7 @@ fn position(photon: &Photon) -> [f32; 3] {
     [x, y, z]
 }
 
-/// What each receiver sums up of the photons that `find` gives it.
+/// Sums the photons that `find` returns for each receiver.
 fn gather<R: Receivers>(
     receivers: &R,
     photons: &[Photon],
@@ -145,12 +145,12 @@ fn gather<R: Receivers>(
     (0..receivers.count()).into_par_iter().map(of_receiver).collect()
 }
 
-/// What each receiver accepts, by testing every photon.
+/// Tests every photon for each receiver.
 pub fn gather_naive<R: Receivers>(receivers: &R, photons: &[Photon]) -> Vec<Gathered> {
     gather(receivers, photons, |_, visit| (0..photons.len()).for_each(visit))
 }
 
-/// The same by asking a kd-tree for those nearby: the paper's CPU version.
+/// Tests the photons that a k-d tree finds: the paper's CPU version.
 pub fn gather_kd_tree<R: Receivers>(receivers: &R, photons: &[Photon]) -> Vec<Gathered> {
     let positions: Vec<[f32; 3]> = photons.iter().map(position).collect();
     let tree = KdTree::new(&positions);

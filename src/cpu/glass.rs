@@ -1,4 +1,4 @@
-//! Boundaries of dielectrics: Snell's law, Fresnel's equations for unpolarised light, and microfacets (Walter and others,
+//! Dielectric boundaries: Snell's law, the Fresnel equations for unpolarised light, and microfacets (Walter and others,
 //! «Microfacet Models for Refraction through Rough Surfaces», EGSR 2007).
 
 use glam::DVec3;
@@ -7,43 +7,43 @@ use super::reflector::{Reflector, coat_passes};
 use super::vector::rgb;
 use crate::layout::{Material, SPECULAR_CHANGED};
 
-/// A boundary as light meets that comes from one side. `n` faces that side.
+/// A dielectric boundary, for light from one side. `n` points to that side.
 #[derive(Debug, Clone, Copy)]
 pub struct Glass {
-    /// Index inside over that outside.
+    /// Refractive index inside over that outside.
     ior: f64,
-    /// The light comes from outside.
+    /// The light arrives from outside.
     front: bool,
-    /// A wall without an inside.
+    /// A thin wall: no interior.
     thin: bool,
     microfacets: Reflector,
     coat: f64,
-    /// `KHR_materials_specular`: the ends of Fresnel's curve.
+    /// `KHR_materials_specular`: f0 and f90.
     specular: Option<(DVec3, f64)>,
 }
 
-/// What becomes of light: direction, part of its power, and index of the incident side over that of the other side.
+/// A sampled direction.
 #[derive(Debug, Clone, Copy)]
-pub struct Turn {
+pub struct DielectricSample {
     /// Unit vector.
     pub direction: DVec3,
-    /// Chance of it.
+    /// Probability of this sample instead of the other one.
     pub probability: f64,
-    /// Part of the flux that goes on, of what has taken this way.
+    /// Factor of the flux of a path that chose this sample.
     pub weight: DVec3,
 }
 
-/// Both ways that light can take.
+/// One sample on each side of the boundary.
 #[derive(Debug, Clone, Copy)]
-pub struct Turns {
-    /// Mirrored at the boundary or its microfacet.
-    pub reflected: Turn,
+pub struct DielectricSamples {
+    /// Reflection at the boundary or a microfacet.
+    pub reflected: DielectricSample,
     /// `None` for total internal reflection.
-    pub refracted: Option<Turn>,
+    pub refracted: Option<DielectricSample>,
 }
 
 impl Glass {
-    /// `outside`: index of refraction there.
+    /// `outside`: refractive index on the outer side.
     pub fn new(material: &Material, outside: f64, front: bool) -> Self {
         let ior = f64::from(material.ior) / outside;
         let changed = material.flags & SPECULAR_CHANGED != 0;
@@ -60,12 +60,12 @@ impl Glass {
         }
     }
 
-    /// Whether its directions have no density.
+    /// Whether both samples are delta distributions.
     pub fn is_smooth(&self) -> bool {
         self.microfacets.is_smooth()
     }
 
-    /// Index of the side that light comes from over that of the other side.
+    /// Refractive index of the incident side over that of the other side.
     fn incident_eta(&self) -> f64 {
         if self.front || self.thin {
             1.0 / self.ior
@@ -74,14 +74,14 @@ impl Glass {
         }
     }
 
-    /// The same of the sides that light is in before and after it: radiance takes its square on its way through (Veach, 1997,
+    /// The same for the media before and after the boundary (1 for thin walls). Radiance scales with its square (Veach, 1997,
     /// section 5.2).
     pub fn eta(&self) -> f64 {
         if self.thin { 1.0 } else { self.incident_eta() }
     }
 
-    /// What extensions make of what is reflected and of what passes at this cosine to the microfacet, where Fresnel's equations
-    /// say `reflectance`. `l`: where passing light goes.
+    /// Weights of reflection and transmission by extensions (specular, clear coat) relative to the Fresnel equations'
+    /// `reflectance`, at this cosine to the microfacet. `l`: direction of the transmitted light.
     fn weights(&self, n: DVec3, v: DVec3, l: DVec3, cosine: f64, reflectance: f64) -> [DVec3; 2] {
         let [mut reflected, mut refracted] = [DVec3::ONE; 2];
         if let (Some((f0, f90)), true) = (self.specular, reflectance < 1.0) {
@@ -91,7 +91,7 @@ impl Glass {
             reflected *= changed / reflectance.max(1e-10);
             refracted *= (1.0 - changed) / (1.0 - reflectance);
         }
-        // A coat lies outside, and its angle is the same whichever way the light goes.
+        // The coat lies outside, and its angle does not depend on the light's direction.
         if self.front || self.thin {
             reflected *= coat_passes(self.coat, cosine);
         }
@@ -104,9 +104,9 @@ impl Glass {
         [reflected, refracted]
     }
 
-    /// Both ways of light from `v`, by a microfacet that `u` chooses. Off a leaning `n` a reflection may point into the surface:
-    /// then the geometric normal takes its place.
-    pub fn turns(&self, n: DVec3, geometric: DVec3, v: DVec3, u: [f64; 2]) -> Turns {
+    /// Samples reflection and transmission of light from `v`, at a microfacet that `u` chooses. With an interpolated or mapped
+    /// `n` a reflection may point into the surface: then it is reflected about the geometric normal.
+    pub fn sample(&self, n: DVec3, geometric: DVec3, v: DVec3, u: [f64; 2]) -> DielectricSamples {
         let rough = !self.is_smooth();
         let m = if rough {
             self.microfacets.visible_normal(n, v, u)
@@ -124,15 +124,15 @@ impl Glass {
         let fresnel = fresnel_dielectric(cos_i, eta);
         let reflectance = fresnel.map_or(1.0, |(reflectance, _)| reflectance);
         let refracted = fresnel.map(|(_, cos_t)| match (self.thin, rough) {
-            // Microfacets on both sides: what is reflected, turned to the other side.
+            // Thin wall with microfacets on both sides: the reflection, mirrored to the other side.
             (true, true) => mirrored - 2.0 * up * n,
             (true, false) => -v,
-            // The tangential part of the wave vector stays the same.
+            // The tangential part of the wave vector is preserved.
             (false, _) => (eta * (cos_i * m - v) - cos_t * m).normalize(),
         });
         let [of_reflected, of_refracted] = self.weights(n, v, refracted.unwrap_or(-v), cos_i, reflectance);
-        Turns {
-            reflected: Turn {
+        DielectricSamples {
+            reflected: DielectricSample {
                 direction: mirrored_above(geometric, m, v),
                 probability: reflectance,
                 weight: kept * of_reflected,
@@ -144,7 +144,7 @@ impl Glass {
                     (true, true) => self.microfacets.masking(down),
                     (true, false) => 0.0,
                 };
-                Turn {
+                DielectricSample {
                     direction,
                     probability: 1.0 - reflectance,
                     weight: kept * of_refracted,
@@ -153,8 +153,8 @@ impl Glass {
         }
     }
 
-    /// BSDF · cos of a rough boundary for radiance from `l` to `v`, and the density by which [`Self::turns`], one of them by its
-    /// probability, chooses `l`.
+    /// BSDF · cos of a rough boundary for radiance from `l` to `v`, and the density of `l` by [`Self::sample`] when one of its
+    /// samples is chosen by its probability.
     pub fn evaluate(&self, n: DVec3, geometric: DVec3, v: DVec3, l: DVec3) -> (DVec3, f64) {
         const NOTHING: (DVec3, f64) = (DVec3::ZERO, 0.0);
         if self.is_smooth() {
@@ -170,13 +170,13 @@ impl Glass {
         let length = h.length();
         let h = (if h.dot(n) < 0.0 { -h } else { h }) / length.max(1e-6);
         let (nv, nl, vh, lh) = (n.dot(v), n.dot(l), v.dot(h), l.dot(h));
-        // Straight through without bending, any microfacet will do: that is no lobe.
+        // Straight transmission without refraction: every microfacet matches, so there is no lobe.
         if nv <= 0.0 || vh <= 0.0 || (nl < 0.0) != passes || (bends && lh >= 0.0) || length < 1e-6 {
             return NOTHING;
         }
         let reflectance = fresnel_dielectric(vh, eta).map_or(1.0, |(reflectance, _)| reflectance);
         let [reflected, refracted] = self.weights(n, v, l, vh, reflectance);
-        // Density of the microfacet's normal, over 4 v·h where it mirrors.
+        // Density of the microfacet's normal, divided by 4 v·h below for reflection.
         let visible = self.microfacets.ggx(n, h) * self.microfacets.masking(nv) / nv;
         if !passes {
             let density = reflectance * 0.25 * visible;
@@ -196,7 +196,7 @@ impl Glass {
     }
 }
 
-/// `v`, mirrored about `n`, or about the geometric normal where that points into the surface.
+/// `v` reflected about `n`, or about the geometric normal if that would point into the surface.
 pub(super) fn mirrored_above(geometric: DVec3, n: DVec3, v: DVec3) -> DVec3 {
     let about = |n: DVec3| 2.0 * v.dot(n) * n - v;
     let mirrored = about(n);
@@ -213,8 +213,8 @@ fn normal_reflectance(ior: f64) -> f64 {
     ((ior - 1.0) / (ior + 1.0)).powi(2)
 }
 
-/// Unpolarised Fresnel reflectance of a dielectric and the cosine beyond; `eta`: index of the incident side over that of the other
-/// side. `None` where all is reflected.
+/// Unpolarised Fresnel reflectance of a dielectric and the cosine of the refracted ray. `eta`: refractive index of the incident
+/// side over that of the other side. `None` for total internal reflection.
 pub(super) fn fresnel_dielectric(cos_i: f64, eta: f64) -> Option<(f64, f64)> {
     let sin2_t = eta * eta * (1.0 - cos_i * cos_i).max(0.0);
     if sin2_t >= 1.0 {
@@ -232,24 +232,24 @@ mod tests {
 
     use super::*;
 
-    fn meet(front: bool, angle: f64) -> Turns {
+    fn sample(front: bool, angle: f64) -> DielectricSamples {
         let material = Material {
             ior: 1.5,
             ..Material::zeroed()
         };
         let v = DVec3::new(-angle.sin(), 0.0, angle.cos());
-        Glass::new(&material, 1.0, front).turns(DVec3::Z, DVec3::Z, v, [0.0; 2])
+        Glass::new(&material, 1.0, front).sample(DVec3::Z, DVec3::Z, v, [0.0; 2])
     }
 
     #[test]
     fn glass_reflects_four_percent_and_bends_by_snells_law() {
-        assert!((meet(true, 0.0).reflected.probability - 0.04).abs() < 1e-12);
+        assert!((sample(true, 0.0).reflected.probability - 0.04).abs() < 1e-12);
         let angle: f64 = 0.7;
-        let turns = meet(true, angle);
-        let refracted = turns.refracted.expect("light enters the denser medium").direction;
+        let samples = sample(true, angle);
+        let refracted = samples.refracted.expect("light enters the denser medium").direction;
         assert!((refracted.x - angle.sin() / 1.5).abs() < 1e-12 && refracted.z < 0.0);
         let mirrored = DVec3::new(angle.sin(), 0.0, angle.cos());
-        assert!((turns.reflected.direction - mirrored).length() < 1e-12);
+        assert!((samples.reflected.direction - mirrored).length() < 1e-12);
     }
 
     #[test]
@@ -258,10 +258,10 @@ mod tests {
         let brewster = ior.atan();
         // r∥ = 0 there, r⊥ = cos²θ_i − sin²θ_i.
         let expected = 0.5 * (brewster.cos().powi(2) - brewster.sin().powi(2)).powi(2);
-        assert!((meet(true, brewster).reflected.probability - expected).abs() < 1e-12);
+        assert!((sample(true, brewster).reflected.probability - expected).abs() < 1e-12);
         let critical = (1.0 / ior).asin();
-        assert!(meet(false, critical - 1e-6).refracted.is_some());
-        let beyond = meet(false, critical + 1e-6);
+        assert!(sample(false, critical - 1e-6).refracted.is_some());
+        let beyond = sample(false, critical + 1e-6);
         assert!(beyond.refracted.is_none() && beyond.reflected.probability == 1.0);
     }
 }

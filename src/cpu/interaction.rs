@@ -1,4 +1,4 @@
-//! Where a ray meets matter: which of the faces in one place, with what textures make of it, and between which media.
+//! Surface interactions: coincident faces, textures, and media.
 
 use glam::DVec3;
 
@@ -9,24 +9,24 @@ use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
 use super::lights::{emits, emitted_radiance};
 use super::media::{Media, Medium, bounded_medium, ior_of_medium};
 use super::surface::{Normals, Surface, surface_of};
-use super::texture::{apply_textures, is_face_there, share_there};
+use super::texture::{apply_textures, is_hit, opacity};
 use super::vector::rgb;
 use crate::layout::{BACK_HIDDEN, BACKED, COINCIDENT, DIELECTRIC, Material, PARALLEL, ROUNDINGS, SEE_THROUGH, TOUCHED};
 use crate::random::Random;
 
-/// What lies in the place where a ray meets matter.
+/// The faces at the point where a ray hits a surface.
 struct Interface {
-    /// That it meets, without its textures.
+    /// The face that is hit, without textures.
     surface: Surface,
-    /// Chance of that, where something isn't there everywhere.
-    share: f64,
+    /// Probability of hitting it, if faces are partly transparent.
+    opacity: f64,
     /// A solid dielectric without thickness.
     is_flat: bool,
-    /// Of the other boundaries of dielectrics there.
+    /// Of the other dielectric boundaries.
     tint: DVec3,
-    /// That the ray came through.
+    /// Media in front of the boundaries.
     through: Media,
-    /// Behind boundaries of dielectrics.
+    /// Media behind the boundaries.
     beyond: Media,
 }
 
@@ -38,27 +38,33 @@ fn is_front(surface: &Surface, incoming: DVec3) -> bool {
     incoming.dot(surface.geometric_normal) < 0.0
 }
 
-/// Whether it is a back that no camera sees.
+/// Whether it is a back face that is culled for the camera.
 pub(super) fn is_hidden_back(surface: &Surface, incoming: DVec3) -> bool {
     surface.material.flags & BACK_HIDDEN != 0 && incoming.dot(surface.geometric_normal) > 0.0
 }
 
-/// Of faces in one place that are no dielectrics', the highest is met.
+/// Priority of coincident faces that are not dielectric: the highest is hit.
 fn preference(surface: &Surface, incoming: DVec3) -> (bool, bool, bool, bool, u32) {
     let front = is_front(surface, incoming);
     let material = &surface.material;
-    let shines = rgb(material.emission).max_element() > 0.0 && emits(material, front);
+    let emitting = rgb(material.emission).max_element() > 0.0 && emits(material, front);
     let hidden = material.flags & BACK_HIDDEN != 0;
-    (shines, front, !hidden, surface.flags & SEE_THROUGH != 0, surface.object)
+    (
+        emitting,
+        front,
+        !hidden,
+        surface.flags & SEE_THROUGH != 0,
+        surface.object,
+    )
 }
 
 impl Interface {
-    /// `media`: those that the ray is in, as far as its path knows. With `culls` backs that no camera sees aren't there.
+    /// `media`: those that the ray is in, as tracked by its path. With `culls`, culled back faces are ignored.
     fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, culls: bool, random: &Random) -> Self {
         let first = surface_of(inputs.scene, hit);
         let mut place = Self {
             surface: first,
-            share: share_there(inputs.scene, &first),
+            opacity: opacity(inputs.scene, &first),
             is_flat: false,
             tint: DVec3::ONE,
             through: media,
@@ -78,7 +84,7 @@ impl Interface {
         let mut missing = None;
         let mut solid: Option<Surface> = None;
         let mut reach = first.reach;
-        for (other, at) in others(inputs, hit, &first) {
+        for (other, at) in coincident_faces(inputs, hit, &first) {
             let both = other.reach.max(first.reach);
             let n = first.geometric_normal;
             let apart = (other.position - first.position).dot(n).abs() > ROUNDINGS * n.abs().dot(both);
@@ -88,10 +94,10 @@ impl Interface {
                 continue;
             }
             let preference = preference(&other, incoming);
-            let share = share_there(inputs.scene, &other);
-            if !is_face_there(inputs.scene, &other, at, random) {
-                // Shares aren't negative: their bits have an order.
-                missing = missing.max(Some((preference, share.to_bits())));
+            let opacity = opacity(inputs.scene, &other);
+            if !is_hit(inputs.scene, &other, at, random) {
+                // Opacities are not negative, so that their bits have the same order.
+                missing = missing.max(Some((preference, opacity.to_bits())));
                 continue;
             }
             reach = reach.max(both);
@@ -99,7 +105,7 @@ impl Interface {
                 if Some(preference) > preferred {
                     preferred = Some(preference);
                     place.surface = other;
-                    place.share = share;
+                    place.opacity = opacity;
                 }
             } else if is_solid(&other.material) && preferred.is_none() {
                 if doubles {
@@ -113,10 +119,10 @@ impl Interface {
                 }
             }
         }
-        if let Some((missing, share)) = missing
+        if let Some((missing, opacity)) = missing
             && Some(missing) > preferred
         {
-            place.share *= 1.0 - f64::from_bits(share);
+            place.opacity *= 1.0 - f64::from_bits(opacity);
         }
         if preferred.is_some() {
             place.is_flat = false;
@@ -125,7 +131,7 @@ impl Interface {
             place.through = media;
             place.beyond = media;
         } else if let Some(solid) = solid {
-            // The boundary is that of what is there on either side.
+            // The boundary belongs to the medium that counts on either side.
             let own = bounded(&first);
             let counts = is_solid(&first.material) && [place.through.first(), place.beyond.first()].contains(&own);
             if !counts {
@@ -137,7 +143,7 @@ impl Interface {
         place
     }
 
-    /// As the ray crosses a boundary of a medium.
+    /// Updates the media as the ray crosses a boundary.
     fn cross(&mut self, medium: Medium, front: bool, nested: bool) {
         if front {
             if nested {
@@ -151,13 +157,13 @@ impl Interface {
     }
 }
 
-/// Faces about a hit.
-fn others<'a>(
+/// Other faces within rounding distance of a hit.
+fn coincident_faces<'a>(
     inputs: &'a Inputs<'_>,
     hit: Hit,
     first: &Surface,
 ) -> impl Iterator<Item = (Surface, PlacedTriangle)> + use<'a> {
-    // What lies there may be larger and so less certain.
+    // The other face may be larger, and its plane then less certain.
     let probe = ROUNDINGS * first.reach.element_sum().max(1.0) * first.geometric_normal;
     let ray = Ray {
         origin: first.position + probe,
@@ -168,32 +174,32 @@ fn others<'a>(
     hits.map(|hit| (surface_of(inputs.scene, hit), hit.at))
 }
 
-/// Where a ray meets matter.
+/// A ray's interaction with a surface.
 pub struct Interaction {
-    /// With its textures.
+    /// With textures.
     pub surface: Surface,
-    /// On the side that the ray comes from.
+    /// On the side of the incoming ray.
     pub normals: Normals,
-    /// Chance that it is met there, where something isn't there everywhere.
-    pub share: f64,
-    /// A boundary inside of something of lower rank: nothing but its tint counts.
+    /// Probability of hitting it, if faces are partly transparent.
+    pub opacity: f64,
+    /// A boundary inside a medium of lower rank: only its tint counts.
     pub hidden: bool,
-    /// Index of refraction outside of a dielectric.
+    /// Refractive index on the outer side of a dielectric.
     pub outside: f64,
-    /// What light keeps that passes the boundaries of dielectrics there.
+    /// Tint of all dielectric boundaries at the hit.
     pub tint: DVec3,
-    /// That the ray came through.
+    /// Media in front of the boundaries.
     pub through: Media,
-    /// Behind boundaries of dielectrics.
+    /// Media behind the boundaries.
     pub beyond: Media,
 }
 
 impl Interaction {
-    /// Of a ray that meets a face while it is in `media`. With `culls` backs that no camera sees aren't there.
+    /// For a ray that hits a face while it is in `media`. With `culls`, culled back faces are ignored.
     pub fn new(inputs: &Inputs<'_>, hit: Hit, incoming: DVec3, media: Media, culls: bool, random: &Random) -> Self {
         let Interface {
             mut surface,
-            share,
+            opacity,
             is_flat,
             tint,
             through,
@@ -209,7 +215,7 @@ impl Interaction {
         let outer = if normals.front { through } else { beyond };
         Self {
             normals,
-            share,
+            opacity,
             hidden: nests && through.first() == beyond.first(),
             outside: if nests {
                 ior_of_medium(inputs, outer.first())
@@ -223,7 +229,7 @@ impl Interaction {
         }
     }
 
-    /// How it scatters, at a wavelength (nm) where that matters.
+    /// The BSDF, at a wavelength (nm) after dispersion.
     pub fn bsdf(&self, wavelength: Option<f64>) -> Bsdf {
         let mut material = self.surface.material;
         if let Some(wavelength) = wavelength.filter(|_| material.dispersion > 0.0) {
@@ -232,7 +238,7 @@ impl Interaction {
         Bsdf::new(&material, self.normals, self.outside, self.tint)
     }
 
-    /// Radiance that leaves towards where the ray comes from.
+    /// Radiance emitted towards the ray's origin.
     pub fn emitted(&self, incoming: DVec3) -> DVec3 {
         let material = &self.surface.material;
         if emits(material, self.normals.front) {

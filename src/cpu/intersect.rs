@@ -1,4 +1,4 @@
-//! Rays against triangles.
+//! Ray-triangle intersection.
 
 use std::ops::Range;
 
@@ -11,22 +11,22 @@ use crate::layout::{BvhRecord, LEAF, PLACEMENT_RECORD};
 use crate::packing::PackedScene;
 use crate::scene::Placement;
 
-/// Of a distance, that rounding may change.
+/// Relative rounding error of distances.
 const TIE: f64 = 1e-9;
 
 /// The points `origin + t · direction` with t > 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Ray {
-    /// Where it starts, render units.
+    /// In render units.
     pub origin: DVec3,
-    /// Need not be a unit vector.
+    /// Not necessarily a unit vector.
     pub direction: DVec3,
 }
 
-/// A triangle, and the instance that puts it where it is.
+/// A triangle, with the instance that places it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PlacedTriangle {
-    /// Index of the instance; `None` of one in render space.
+    /// Index of the instance; `None` if the triangle is in render space.
     pub instance: Option<u32>,
     /// Index of the triangle in the order of the BVH's leaves.
     pub triangle: u32,
@@ -41,12 +41,12 @@ impl PlacedTriangle {
         }
     }
 
-    /// Where it is put.
+    /// Its instance's transform.
     pub(super) fn placement(self, scene: &PackedScene) -> Option<Placement> {
         self.instance.map(|instance| placement(scene, instance))
     }
 
-    /// Its corners in render space, with the device's roundings.
+    /// Its corners in render space, rounded as on the device.
     pub(super) fn corners(self, scene: &PackedScene) -> [DVec3; 3] {
         let triangle = &scene.shading_triangles[self.triangle as usize];
         let corners = [triangle.p0, triangle.p1, triangle.p2].map(xyz);
@@ -62,21 +62,20 @@ fn placement(scene: &PackedScene, instance: u32) -> Placement {
     }
 }
 
-/// Where a ray meets a triangle.
+/// Where a ray hits a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// Distance in lengths of the ray's direction.
     pub t: f64,
-    /// Barycentric coordinate of the triangle's second corner.
+    /// Barycentric coordinate of the second corner.
     pub u: f64,
-    /// Barycentric coordinate of its third corner.
+    /// Barycentric coordinate of the third corner.
     pub v: f64,
-    /// Which.
+    /// The triangle.
     pub at: PlacedTriangle,
 }
 
-/// How far a search has come along a ray: hits count that come later, those at the same distance in the order of instances and
-/// triangles.
+/// Progress of a search along a ray: only later hits count. Hits at the same distance are ordered by instance and triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Progress {
     t: f64,
@@ -94,7 +93,7 @@ impl Progress {
     }
 }
 
-/// The nearest triangle but `ignored` before t = `limit`.
+/// The nearest triangle except `ignored` before t = `limit`.
 pub fn nearest_hit(inputs: &Inputs<'_>, ray: Ray, limit: f64, ignored: Option<PlacedTriangle>) -> Option<Hit> {
     nearest_hit_from(inputs, ray, Progress::AT_ORIGIN, limit, ignored)
 }
@@ -148,7 +147,7 @@ impl<'a> Search<'a> {
         self.hit
     }
 
-    /// Whether a hit counts, and is nearer than the nearest so far.
+    /// Whether a hit comes after `progress`, and is nearer than the nearest so far.
     fn is_nearer(&self, t: f64, at: PlacedTriangle) -> bool {
         let later = t > self.progress.t || (t == self.progress.t && self.progress.at.is_some_and(|last| last < at));
         let nearer = t < self.limit || (t == self.limit && self.hit.is_some_and(|hit| at < hit.at));
@@ -170,12 +169,12 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Goes through the hierarchy below a root, which an instance puts somewhere.
+    /// Traverses the hierarchy below a root, in the space of an instance if there is one.
     fn traverse(&mut self, records: &[BvhRecord], root: u32, instance: Option<Entered>) {
         let to_local = instance.map_or(DAffine3::IDENTITY, |entered| entered.to_local);
         let wider = instance.map_or(0.0, |entered| entered.widening);
         let origin = to_local.transform_point3(self.ray.origin);
-        // A component of 0 gives infinite slabs; ±1e-20 keeps 0 · ∞ out of them.
+        // A component of 0 gives infinite slabs; ±1e-20 avoids 0 · ∞.
         let safe = |d: f64| if d.abs() < 1e-20 { 1e-20 } else { d };
         let inverse = to_local.transform_vector3(self.ray.direction).map(safe).recip();
         let mut stack = Vec::with_capacity(64);
@@ -216,12 +215,12 @@ impl<'a> Search<'a> {
 struct Entered {
     index: u32,
     to_local: DAffine3,
-    /// What boxes are widened by, since the corners are rounded where they are put.
+    /// Widening of the boxes, for the rounding of placed corners.
     widening: f64,
 }
 
 impl Entered {
-    /// By its two records.
+    /// From the instance's two records.
     fn new(scene: &PackedScene, to_render: &BvhRecord, ray: &BvhRecord) -> Self {
         let index = to_render.row3[0].to_bits();
         Self {
@@ -240,22 +239,22 @@ fn leaf(records: &[BvhRecord], reference: u32) -> Range<u32> {
     first..first + 1 + others.unwrap_or(0) as u32
 }
 
-/// The references to those children of a node whose boxes the ray enters before `limit`, and t at the entry. The origin is
-/// given as the boxes' lower and as their upper corners see it.
+/// References to the children of a node whose boxes the ray enters before `limit`, with t at the entry. The origin is shifted for
+/// the boxes' lower and upper corners.
 fn children(node: &BvhRecord, [low, high]: [DVec3; 2], inverse: DVec3, limit: f64) -> [Option<(u32, f64)>; 2] {
     [(node.row0, node.row1), (node.row2, node.row3)].map(|(min, max)| {
         let (t0, t1) = ((xyz(min) - low) * inverse, (xyz(max) - high) * inverse);
         let enter = t0.min(t1).max_element().max(0.0);
-        // The factors cover the rounding of the slab test (Ize, «Robust BVH Ray Traversal», JCGT 2(2), 2013) and of faces in one
-        // place.
+        // The factors cover the rounding of the slab test (Ize, «Robust BVH Ray Traversal», JCGT 2(2), 2013) and of coincident
+        // faces.
         let leave = t0.max(t1).min_element().min(limit * (1.0 + TIE)) * (1.0 + 4.0 * f64::EPSILON);
         (enter <= leave).then_some((word(min), enter))
     })
 }
 
-/// t > 0 and the barycentric coordinates of the second and the third corner, by the signed volumes that the ray spans
-/// with each edge: Kensler and Shirley, «Optimizing Ray-Triangle Intersection via Automated Search», 2006. Two
-/// triangles that share an edge compute the same volume for it, up to the sign, so that no ray passes between them.
+/// t > 0 and the barycentric coordinates of the second and the third corner, by the signed volumes of the ray and each edge:
+/// Kensler and Shirley, «Optimizing Ray-Triangle Intersection via Automated Search», 2006. Two triangles that share an edge
+/// compute the same volume for it, up to the sign, so that no ray passes between them.
 fn intersect_triangle(ray: Ray, corners: [DVec3; 3]) -> Option<(f64, f64, f64)> {
     let [a, b, c] = corners.map(|corner| corner - ray.origin);
     let d = ray.direction;
@@ -308,7 +307,7 @@ mod tests {
 
     #[test]
     fn no_ray_passes_between_two_triangles() {
-        // A fan around a corner that f32 can't hold exactly, and rays at points of its edges.
+        // A fan around a corner that f32 cannot represent exactly, and rays to points on its edges.
         let centre = DVec3::new(0.1, 0.2, 0.3);
         let rim = |i: u32| {
             let angle = f64::from(i) * 0.7;

@@ -1,7 +1,7 @@
-//! Lights: sample what arrives at a point, and its density; sample what leaves.
+//! Lights: samples of incident light with densities, and samples of emission.
 //!
-//! A light is a triangle or a part of one, a point, a spot, a sun or the environment. Lights of one object are a *source*, which
-//! has a probability for each of them.
+//! A light is a triangle or a part of one, a point, a spot, a sun or the environment. The lights of one object form a *source*,
+//! which has a probability for each of them.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use super::media::{Media, transmittance};
 use super::reflector::coat_passes;
 use super::sampling::{basis, cosine_direction, direction_in_cone, disc_point, triangle_point};
 use super::surface::{Surface, offset_origin, surface_at};
-use super::texture::{apply_textures, share_there};
+use super::texture::{apply_textures, opacity};
 use super::vector::rgb;
 use super::{FAR, Inputs};
 use crate::alias::{self, AliasCell};
@@ -22,18 +22,17 @@ use crate::layout::{
 };
 use crate::packing::Part;
 
-/// Whether light leaves on the triangle's front, or on its back.
+/// Whether the triangle emits on its front or its back.
 pub(super) fn emits(material: &Material, front: bool) -> bool {
     front || material.flags & BACK_EMITS != 0
 }
 
-/// Radiance at this cosine to the normal: a coat lies on lamps too.
+/// Emitted radiance at this cosine to the normal. A clear coat also covers lamps.
 pub(super) fn emitted_radiance(material: &Material, cosine: f64) -> DVec3 {
     coat_passes(f64::from(material.coat), cosine) * rgb(material.emission)
 }
 
-/// How much of its intensity a spot has at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as
-/// `KHR_lights_punctual` recommends.
+/// Falloff of a spot's intensity: the square of a ramp in the cosine, as `KHR_lights_punctual` recommends.
 fn spot_falloff(light: &Light, direction: DVec3) -> f64 {
     if light.kind != SPOT_LIGHT {
         return 1.0;
@@ -43,29 +42,29 @@ fn spot_falloff(light: &Light, direction: DVec3) -> f64 {
     ((outer - versine) / (outer - inner)).clamp(0.0, 1.0).powi(2)
 }
 
-/// What a light with a range has left at a distance: `KHR_lights_punctual`'s window over the inverse square.
+/// Attenuation by a light's range: `KHR_lights_punctual`'s window over the inverse square.
 pub(super) fn range_window(inverse_range: f64, distance: f64) -> f64 {
     (1.0 - (distance * inverse_range).powi(4)).clamp(0.0, 1.0)
 }
 
-/// A place on a light, as a point sees it.
+/// A sample of the light that arrives at a point.
 #[derive(Debug, Clone, Copy)]
 pub struct LightSample {
-    /// From the point to the light, if nothing is between within `end` of its lengths.
+    /// From the point to the light; unoccluded if nothing is hit before t = `end`.
     pub ray: Ray,
     /// See [`Self::ray`].
     pub end: f64,
-    /// The triangle that the light is.
+    /// The emissive triangle.
     pub ignored: Option<PlacedTriangle>,
-    /// Unit vector to the place.
+    /// Unit vector to the sampled point.
     pub towards: DVec3,
-    /// Radiance; of a light without surface, irradiance across the ray.
+    /// Radiance; irradiance across the ray for delta lights.
     pub radiance: DVec3,
-    /// Per solid angle; `None` of a light without surface, which no other way of sampling meets.
+    /// Per solid angle; `None` for delta lights, which no BSDF sample hits.
     pub density: Option<f64>,
 }
 
-/// Samples what arrives from a light at a point. `origin` is where rays leave it in a direction.
+/// Samples the light that arrives at a point. `origin` gives the ray's origin for a direction.
 pub fn sample_incident(
     inputs: &Inputs<'_>,
     light: u32,
@@ -77,7 +76,7 @@ pub fn sample_incident(
     let light = &inputs.scene.lights[index as usize];
     let media = Media::of(inputs.scene.media_of_lights[index as usize]);
     if light.kind == ENVIRONMENT_LIGHT {
-        let (towards, sky) = Environment::of(&inputs.scene.environment).sample(u.x, u.y);
+        let (towards, sample) = Environment::of(&inputs.scene.environment).sample(u.x, u.y);
         return Some(LightSample {
             ray: Ray {
                 origin: origin(towards),
@@ -86,8 +85,8 @@ pub fn sample_incident(
             end: FAR,
             ignored: None,
             towards,
-            radiance: sky.radiance,
-            density: Some(sky.density),
+            radiance: sample.radiance,
+            density: Some(sample.density),
         });
     }
     if light.is_punctual() {
@@ -102,14 +101,14 @@ pub fn sample_incident(
             density: None,
         });
     }
-    let (u, v) = place_on(light, u).into();
+    let (u, v) = point_on_triangle(light, u).into();
     let triangle = PlacedTriangle::unplaced(light.triangle);
     let mut emitter = surface_at(inputs.scene, triangle, u, v);
     apply_textures(inputs.scene, &mut emitter);
     let origin = origin(emitter.position - point);
-    let (towards, radiance, density) = of_triangle(inputs, &emitter, index, point)?;
+    let (towards, radiance, density) = emission_towards(inputs, &emitter, index, point)?;
     Some(LightSample {
-        // Both ends move off their surfaces.
+        // Both ends are offset from their surfaces.
         ray: Ray {
             origin,
             direction: emitter.origin_towards(point - emitter.position) - origin,
@@ -117,13 +116,14 @@ pub fn sample_incident(
         end: 1.0 - ENDS_BEFORE,
         ignored: Some(triangle),
         towards,
-        radiance: radiance * share_there(inputs.scene, &emitter),
+        radiance: radiance * opacity(inputs.scene, &emitter),
         density: Some(density),
     })
 }
 
-/// Direction, radiance and density per solid angle of a place on a triangle's light; `None` where it doesn't shine there.
-fn of_triangle(inputs: &Inputs<'_>, emitter: &Surface, light: u32, point: DVec3) -> Option<(DVec3, DVec3, f64)> {
+/// Direction, radiance and density per solid angle of a point on an emissive triangle; `None` if it does not emit towards
+/// `point`.
+fn emission_towards(inputs: &Inputs<'_>, emitter: &Surface, light: u32, point: DVec3) -> Option<(DVec3, DVec3, f64)> {
     let way = emitter.position - point;
     let towards = way.normalize_or_zero();
     let cosine = -towards.dot(emitter.geometric_normal);
@@ -136,13 +136,13 @@ fn of_triangle(inputs: &Inputs<'_>, emitter: &Surface, light: u32, point: DVec3)
     Some((towards, radiance, way.length_squared() / (area * cosine.abs())))
 }
 
-/// Radiance from a triangle that a ray met, with its textures, and the density per solid angle by which its source's lights are
-/// sampled there.
-pub fn met_emitter(inputs: &Inputs<'_>, emitter: &Surface, point: DVec3) -> Option<(DVec3, f64)> {
+/// Radiance of an emissive triangle that a ray hit, with textures, and the density per solid angle with which its source's lights
+/// are sampled there.
+pub fn hit_emitter(inputs: &Inputs<'_>, emitter: &Surface, point: DVec3) -> Option<(DVec3, f64)> {
     let lights = &inputs.scene.lights;
     let columns = lights[emitter.light as usize].position[2] as u32;
     let light = emitter.light + Part::around(emitter.uv.into(), columns).number();
-    let (_, radiance, density) = of_triangle(inputs, emitter, light, point)?;
+    let (_, radiance, density) = emission_towards(inputs, emitter, light, point)?;
     let mut sources = inputs.scene.light_sources.iter();
     let source = sources.find(|source| light.wrapping_sub(source.first_light) < source.light_count)?;
     let cumulative = |light: u32| f64::from(lights[light as usize].cumulative);
@@ -154,7 +154,7 @@ pub fn met_emitter(inputs: &Inputs<'_>, emitter: &Surface, point: DVec3) -> Opti
     Some((radiance, density * (cumulative(light) - before)))
 }
 
-/// The ray from a point to a light without surface or a place of it, where it ends in its lengths, and the irradiance across it.
+/// The ray from a point to a delta light or a sampled point of it, the ray's end, and the irradiance across the ray.
 pub fn punctual(light: &Light, point: DVec3, u: DVec2) -> (DVec3, f64, DVec3) {
     let (extent, intensity) = (f64::from(light.extent), rgb(light.intensity));
     if light.kind == DIRECTIONAL_LIGHT {
@@ -168,10 +168,10 @@ pub fn punctual(light: &Light, point: DVec3, u: DVec2) -> (DVec3, f64, DVec3) {
     }
     let mut ray = rgb(light.position) - point;
     let mut distance2 = ray.length_squared().max(1e-37);
-    // Of the light as it is seen.
+    // Area over solid angle of the visible disc.
     let mut area_over_angle = distance2;
     if extent > 0.0 {
-        // A disc that looks here is seen as a sphere is, and from within its radius in half of all directions.
+        // A disc that faces the point subtends the same angle as a sphere; from within its radius, half of all directions.
         let sin2 = (extent * extent / distance2).min(1.0);
         let versine = sin2 / (1.0 + (1.0 - sin2).sqrt());
         let towards = direction_in_cone(ray / distance2.sqrt(), versine, u);
@@ -184,7 +184,7 @@ pub fn punctual(light: &Light, point: DVec3, u: DVec2) -> (DVec3, f64, DVec3) {
     (ray, 1.0, intensity * (falloff * window / area_over_angle))
 }
 
-/// Radiance of a light with an extent where a ray along a unit vector meets it, and how far away; `None` where it passes by.
+/// Radiance of a light with an extent where a ray (a unit vector) hits it, and the distance; `None` if it misses.
 pub fn soft_light_along(light: &Light, ray: Ray) -> Option<(DVec3, f64)> {
     let extent = f64::from(light.extent);
     if !light.is_punctual() || extent <= 0.0 {
@@ -204,13 +204,14 @@ pub fn soft_light_along(light: &Light, ray: Ray) -> Option<(DVec3, f64)> {
     Some((intensity * (shown / (PI * extent * extent)), way))
 }
 
-/// Barycentric coordinates of a point of a triangle's light.
-fn place_on(light: &Light, u: DVec2) -> DVec2 {
+/// Barycentric coordinates of a point on a triangle light or its part.
+fn point_on_triangle(light: &Light, u: DVec2) -> DVec2 {
     let (u, v) = triangle_point(u.x, u.y);
     Part::of(light).place(DVec2::new(u, v))
 }
 
-/// Chooses a light by its power, with the digits of `u` in [0, 1) and of two more numbers below it: its index, and a uniform number.
+/// Chooses a light by its power, by `u` in [0, 1) and two more numbers as its lower digits. Returns an index and a uniform
+/// number.
 pub fn choose_by_power(lights: &[Light], u: f64, digits: [f64; 2]) -> (u32, f64) {
     let choice = alias::choose(lights.len(), u, digits, |cell| AliasCell {
         accept: lights[cell].accept,
@@ -224,45 +225,45 @@ pub fn choose_by_power(lights: &[Light], u: f64, digits: [f64; 2]) -> (u32, f64)
 pub struct Emission {
     /// From the light.
     pub ray: Ray,
-    /// Of all the light's photons, as if it emitted this one alone.
+    /// Flux of the whole light, as if it emitted this photon alone.
     pub flux: DVec3,
-    /// The triangle that it leaves.
+    /// The emissive triangle.
     pub ignored: Option<PlacedTriangle>,
 }
 
-/// Samples what leaves a light: a place by `u`, a direction by `v`, and on triangles that shine to both sides one by `side`.
+/// Samples a light's emission: a position by `u`, a direction by `v`, and for two-sided triangles a side by `side`.
 pub fn sample_emission(inputs: &Inputs<'_>, light: u32, u: DVec2, v: DVec2, side: f64) -> Emission {
     let light = &inputs.scene.lights[light as usize];
     let (area, extent) = (f64::from(light.area), f64::from(light.extent));
     match light.kind {
         TRIANGLE_LIGHT => from_triangle(inputs, light, u, v, side),
         ENVIRONMENT_LIGHT => {
-            let (towards, sky) = Environment::of(&inputs.scene.environment).sample(v.x, v.y);
-            from_afar(towards, area, sky.radiance / sky.density, u)
+            let (towards, sample) = Environment::of(&inputs.scene.environment).sample(v.x, v.y);
+            distant_emission(towards, area, sample.radiance / sample.density, u)
         }
         DIRECTIONAL_LIGHT if extent > 0.0 => {
             let towards = direction_in_cone(-rgb(light.direction), extent, v);
-            from_afar(towards, area, rgb(light.intensity), u)
+            distant_emission(towards, area, rgb(light.intensity), u)
         }
         DIRECTIONAL_LIGHT => {
             let direction = rgb(light.direction);
-            let origin = rgb(light.position) + across(direction, (area / PI).sqrt(), u);
-            started(origin, direction, rgb(light.intensity) * area)
+            let origin = rgb(light.position) + on_disc(direction, (area / PI).sqrt(), u);
+            emission(origin, direction, rgb(light.intensity) * area)
         }
         _ => {
             let (direction, solid_angle) = if light.kind == SPOT_LIGHT {
                 let (versine, solid_angle) = spot_versine(light, v.x);
-                (direction_off(rgb(light.direction), versine, v.y), solid_angle)
+                (direction_around(rgb(light.direction), versine, v.y), solid_angle)
             } else {
-                (direction_off(DVec3::Z, 2.0 * v.x, v.y), 4.0 * PI)
+                (direction_around(DVec3::Z, 2.0 * v.x, v.y), 4.0 * PI)
             };
-            let origin = rgb(light.position) + across(direction, extent, u);
-            started(origin, direction, rgb(light.intensity) * solid_angle)
+            let origin = rgb(light.position) + on_disc(direction, extent, u);
+            emission(origin, direction, rgb(light.intensity) * solid_angle)
         }
     }
 }
 
-fn started(origin: DVec3, direction: DVec3, flux: DVec3) -> Emission {
+fn emission(origin: DVec3, direction: DVec3, flux: DVec3) -> Emission {
     Emission {
         ray: Ray { origin, direction },
         flux,
@@ -270,23 +271,23 @@ fn started(origin: DVec3, direction: DVec3, flux: DVec3) -> Emission {
     }
 }
 
-/// Through the disc of the scene's size across the rays, from before the scene.
-fn from_afar(towards: DVec3, area: f64, irradiance: DVec3, u: DVec2) -> Emission {
+/// Emission of a distant light, through a disc across the rays as large as the scene.
+fn distant_emission(towards: DVec3, area: f64, irradiance: DVec3, u: DVec2) -> Emission {
     let radius = (area / PI).sqrt();
-    started(
-        towards * radius + across(-towards, radius, u),
+    emission(
+        towards * radius + on_disc(-towards, radius, u),
         -towards,
         irradiance * area,
     )
 }
 
-/// A place on a disc about the origin.
-fn across(direction: DVec3, radius: f64, u: DVec2) -> DVec3 {
+/// A point on a disc around the origin.
+fn on_disc(direction: DVec3, radius: f64, u: DVec2) -> DVec3 {
     basis(direction) * (radius * disc_point(u.x, u.y)).extend(0.0)
 }
 
 fn from_triangle(inputs: &Inputs<'_>, light: &Light, u: DVec2, v: DVec2, side: f64) -> Emission {
-    let (x, y) = place_on(light, u).into();
+    let (x, y) = point_on_triangle(light, u).into();
     let triangle = PlacedTriangle::unplaced(light.triangle);
     let mut emitter = surface_at(inputs.scene, triangle, x, y);
     apply_textures(inputs.scene, &mut emitter);
@@ -305,20 +306,20 @@ fn from_triangle(inputs: &Inputs<'_>, light: &Light, u: DVec2, v: DVec2, side: f
             origin: offset_origin(emitter.position, normal, emitter.reach),
             direction,
         },
-        flux: radiance * (PI * sides * f64::from(light.area) * share_there(inputs.scene, &emitter)),
+        flux: radiance * (PI * sides * f64::from(light.area) * opacity(inputs.scene, &emitter)),
         ignored: Some(triangle),
     }
 }
 
-/// A direction around an axis, with 1 − cos of the angle between them.
-fn direction_off(axis: DVec3, versine: f64, turn: f64) -> DVec3 {
+/// A direction at an angle to an axis; `versine`: 1 − cos of the angle.
+fn direction_around(axis: DVec3, versine: f64, turn: f64) -> DVec3 {
     let (sin, cos) = (2.0 * PI * turn).sin_cos();
     let across = (versine * (2.0 - versine)).max(0.0).sqrt();
     (basis(axis) * DVec3::new(across * cos, across * sin, 1.0 - versine)).normalize()
 }
 
-/// 1 − cos of a photon's angle from a spot's axis, such that all photons have the same flux, and the solid angle that would
-/// have the whole intensity.
+/// Samples 1 − cos of the angle to a spot's axis so that all photons have the same flux. Also returns the solid angle of an
+/// equivalent spot with full intensity.
 fn spot_versine(light: &Light, u: f64) -> (f64, f64) {
     let (inner, outer) = (f64::from(light.inner), f64::from(light.outer));
     // The integral of the squared ramp is a third of its width.
@@ -340,7 +341,7 @@ mod tests {
     use crate::random::{PathKind, Random};
     use bytemuck::Zeroable;
 
-    /// A light of one choice in 10¹² has its turn as often: choices near it are enumerated, all others can't be it.
+    /// A light with probability 10⁻¹² is chosen that often: numbers around its cell are enumerated, all others cannot choose it.
     #[test]
     fn faint_lights_are_chosen_as_often_as_they_should_be() {
         let probabilities = [1e-12, 0.3, 0.7 - 1e-8 - 1e-12, 1e-8];
@@ -356,7 +357,7 @@ mod tests {
         let share = |wanted: u32| -> f64 {
             let cell = &lights[wanted as usize];
             assert!(cell.accept > 0.0 && lights.iter().all(|light| light.accept == 1.0 || light.alias != wanted));
-            // Numbers from the beginning of the cell on: as many steps of the digits as it is accepted for, and as many again.
+            // Numbers from the start of the cell: as many digit steps as it is accepted for, and as many again.
             let begin = f64::from(wanted) / 4.0;
             let width = f64::from(cell.accept) / 4.0;
             let count = 100_000;
@@ -396,7 +397,7 @@ mod tests {
             rests += rest;
         }
         let n = f64::from(count);
-        // Six standard deviations: 31 comparisons of a right program fail once in 10⁷ times.
+        // Six standard deviations: 31 comparisons of a correct program fail once in 10⁷ runs.
         for (found, p) in chosen.iter().zip(&probabilities) {
             assert!(
                 (found - n * p).abs() < 6.0 * (n * p * (1.0 - p)).sqrt(),
@@ -415,7 +416,7 @@ mod tests {
         assert_eq!(range_window(0.5, 3.0), 0.0);
     }
 
-    /// The part of a spot's photons within an angle is the part of its intensity's integral there.
+    /// The fraction of a spot's photons within an angle equals the fraction of its integrated intensity.
     #[test]
     fn photons_of_a_spot_are_spread_as_its_intensity() {
         let light = Light {
@@ -428,7 +429,7 @@ mod tests {
         const STEPS: u32 = 100_000;
         let mut integral = 0.0;
         let step = 0.4 / f64::from(STEPS);
-        let falloff = |versine: f64| spot_falloff(&light, direction_off(DVec3::Z, versine, 0.3));
+        let falloff = |versine: f64| spot_falloff(&light, direction_around(DVec3::Z, versine, 0.3));
         let (_, solid_angle) = spot_versine(&light, 0.0);
         for i in 0..STEPS {
             integral += falloff((f64::from(i) + 0.5) * step) * step;

@@ -1,4 +1,4 @@
-//! The solid dielectrics that a ray is in: the counterpart of `glsl/trace/media.glsl`.
+//! The solid dielectrics that a ray is in: `glsl/trace/media.glsl` in f64.
 
 use glam::DVec3;
 
@@ -7,27 +7,27 @@ use super::surface::Surface;
 use super::vector::rgb;
 use crate::layout::{Material, RANK, VACUUM};
 
-/// A medium: its object's rank, then its material. [`VACUUM`] comes last.
+/// A medium: its object's rank and its material. [`VACUUM`] is the highest.
 pub(super) type Medium = u32;
 
-/// Those that a ray is in, in order. Where several overlap, the first is there.
+/// The media that a ray is in, sorted. Where several overlap, the first one counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Media([Medium; 4]);
 
 impl Media {
     pub const VACUUM: Self = Self([VACUUM; 4]);
 
-    /// Those of these names, in order.
+    /// From sorted names.
     pub fn of(names: [Medium; 4]) -> Self {
         Self(names)
     }
 
-    /// What is there.
+    /// The medium that counts.
     pub fn first(&self) -> Medium {
         self.0[0]
     }
 
-    /// Behind a boundary into a medium. Where none overlap, it is the only one.
+    /// After entering a medium. Without overlapping media it is the only one.
     pub fn with(self, medium: Medium, nested: bool) -> Self {
         if !nested {
             return Self([medium, VACUUM, VACUUM, VACUUM]);
@@ -38,7 +38,7 @@ impl Media {
         Self([all[0], all[1], all[2], all[3]])
     }
 
-    /// Behind a boundary out of it.
+    /// After leaving a medium.
     pub fn without(self, medium: Medium, nested: bool) -> Self {
         if !nested {
             return Self::VACUUM;
@@ -49,8 +49,8 @@ impl Media {
     }
 }
 
-/// What a face bounds for a ray that meets it in these media. At the back of one that it isn't in, that is a wall that is an
-/// object of its own, it is what is most like it.
+/// The medium that a face bounds for a ray in `media`. At the back face of a medium that the ray is not in (a wall that is a
+/// separate object), the most similar medium.
 pub(super) fn bounded_medium(inputs: &Inputs<'_>, media: Media, surface: &Surface, front: bool) -> Medium {
     let medium = (surface.flags >> RANK << RANK) | surface.material_index;
     let is_in = !inputs.scene.features.nested || media.0.contains(&medium);
@@ -73,12 +73,12 @@ fn material_of_medium<'a>(inputs: &Inputs<'a>, medium: Medium) -> Option<&'a Mat
     (medium != VACUUM).then(|| &inputs.scene.materials[index])
 }
 
-/// Index of refraction.
+/// Refractive index.
 pub(super) fn ior_of_medium(inputs: &Inputs<'_>, medium: Medium) -> f64 {
     material_of_medium(inputs, medium).map_or(1.0, |material| material.ior.into())
 }
 
-/// What a medium leaves of light over a distance.
+/// Transmittance of a medium over a distance.
 pub(super) fn transmittance(inputs: &Inputs<'_>, media: Media, distance: f64) -> DVec3 {
     material_of_medium(inputs, media.first())
         .map_or(DVec3::ONE, |material| (-rgb(material.absorption) * distance).exp())

@@ -1,13 +1,12 @@
-//! A plain progressive photon mapper in f64: what `--backend cpu` renders with, the oracle of the kernels' tests, and the
-//! paper's CPU column (its kd-tree).
+//! A plain progressive photon mapper in f64. It is the renderer of `--backend cpu`, the reference of the kernels' tests, and the
+//! paper's CPU version (with its k-d tree).
 //!
-//! Each module is a part of the physics: `sampling`, `reflector`, `glass` and `bsdf`, `lights` and `environment`, `texture`,
-//! `intersect` and `interaction`, `gather`, `statistics` (equations 2 to 4). They are pure functions, which kernels are compared
-//! with one by one through probes; `camera`, `photons`, `direct` and `renderer` are the algorithm, made of them. It converges to the
-//! kernels' picture, but repeats neither their steps nor what they do to be quick: emission by learned tables, demand, glass
-//! whose reflections are looked at apart, a map for caustics.
+//! `sampling`, `reflector`, `glass`, `bsdf`, `lights`, `environment`, `texture`, `intersect`, `interaction`, `gather` and
+//! `statistics` (equations 2 to 4) are pure functions. Tests compare the kernels' functions with them through probes. `camera`,
+//! `photons`, `direct` and `renderer` make the algorithm of them. It converges to the kernels' picture, without their
+//! optimisations: learned emission tables, demand, separate estimates of reflections on glass, and a map for caustics.
 //!
-//! Every function gives the same bits whatever the number of threads: no sum depends on an order.
+//! The result does not depend on the number of threads: no sum depends on an order.
 
 mod bsdf;
 mod camera;
@@ -35,9 +34,9 @@ pub use bsdf::{Branch, Bsdf, Width};
 pub use camera::{CameraPath, VisiblePoint};
 pub use coverage::{Place, can_have_photons, is_surrounded};
 pub use dispersion::ior_at;
-pub use environment::{Environment, Sky};
-pub use gather::{Gathered, Receiver, Receivers, SeenByKernels, gather_kd_tree, gather_naive};
-pub use glass::{Glass, Turn, Turns};
+pub use environment::{Environment, EnvironmentSample};
+pub use gather::{DeviceReceivers, Gathered, Receiver, Receivers, gather_kd_tree, gather_naive};
+pub use glass::{DielectricSample, DielectricSamples, Glass};
 pub use intersect::{Hit, PlacedTriangle, Ray, nearest_hit};
 pub use lights::{Emission, LightSample, choose_by_power, punctual, sample_emission, sample_incident};
 pub use reflector::Reflector;
@@ -45,22 +44,22 @@ pub use renderer::Renderer;
 pub use sampling::{cosine_direction, decode_direction, encode_direction};
 pub use statistics::Statistics;
 pub use surface::{Normals, Surface, offset_origin, surface_at};
-pub use texture::{apply_textures, share_there};
+pub use texture::{apply_textures, opacity};
 
 use crate::config::RenderConfig;
 use crate::layout::Settings;
 use crate::packing::PackedScene;
 
-/// A ray's limit where it has none; nothing lies so far, for the scene is 2 long.
+/// The end of unbounded rays. Scenes are 2 units long.
 const FAR: f64 = 1e30;
 
-/// What rays read.
+/// What tracing functions read.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// Triangles, materials, lights.
     pub scene: &'a PackedScene,
     /// The camera.
     pub settings: &'a Settings,
-    /// How it is rendered.
+    /// The render's configuration.
     pub config: &'a RenderConfig,
 }

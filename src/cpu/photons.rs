@@ -1,4 +1,4 @@
-//! Photon paths from the lights, chosen by their power.
+//! Photon paths, from lights chosen by their power.
 
 use glam::{DVec2, DVec3};
 
@@ -18,15 +18,15 @@ use crate::random::Random;
 /// How a path ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// It left the scene, or was absorbed.
+    /// It left the scene or was absorbed.
     Absorbed,
     /// By the bounce limit.
     Truncated,
-    /// By flux that no photon can hold.
+    /// Its flux is not finite.
     NonFinite,
 }
 
-/// Follows a path of an iteration, and adds the photons that it leaves where visible points could be.
+/// Traces a photon path of an iteration, and appends the photons that it deposits on receivers.
 pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons: &mut Vec<Photon>) -> Ending {
     let samples_lights = inputs.config.direct == Direct::Light;
     let mut random = Random::of_photon(inputs.config, path, iteration);
@@ -43,7 +43,7 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
     let mut media = Media::of(inputs.scene.media_of_lights[light as usize]);
     let mut inverse_range = f64::from(chosen.inverse_range);
     let mut wavelength = None;
-    // No bounce since the light: rays to lights bring that light.
+    // No bounce since the light: light samples account for this light.
     let mut is_direct = true;
     let mut depth = 0;
     while depth < inputs.settings.max_depth {
@@ -55,7 +55,7 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
         };
         let incoming = ray.direction;
         let met = Interaction::new(inputs, hit, incoming, media, false, &random);
-        // A range is how far the light itself reaches, not what it lights.
+        // A range limits the light itself, not the light that surfaces scatter.
         flux *= transmittance(inputs, met.through, hit.t) * range_window(inverse_range, hit.t);
         ignored = Some(met.surface.triangle);
         if met.hidden {
@@ -68,12 +68,12 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
         depth += 1;
         flux *= disperse(&met.surface.material, &mut wavelength, &mut random);
         let (v, bsdf) = (-incoming, met.bsdf(wavelength));
-        // The adjoint BSDF, since flux is per area of the geometric surface: Veach, «Robust Monte Carlo Methods for Light Transport
-        // Simulation», 1997, section 5.3.
+        // The adjoint BSDF, because flux is per area of the geometric surface: Veach, «Robust Monte Carlo Methods for Light
+        // Transport Simulation», 1997, section 5.3.
         let arriving = |normal: DVec3| v.dot(normal) / v.dot(met.normals.geometric);
         if bsdf.is_receiver() && !(samples_lights && is_direct) {
-            // What is there in part is seen in part as well as met in part.
-            let landing = flux * arriving(met.normals.shading) / met.share;
+            // Camera paths see a partly transparent surface with the same probability as photons hit it.
+            let landing = flux * arriving(met.normals.shading) / met.opacity;
             if !landing.as_vec3().is_finite() {
                 return Ending::NonFinite;
             }
@@ -89,7 +89,7 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
         };
         let mut scattered = flux * branch.weight / branch.probability;
         if scattered != DVec3::ZERO {
-            // A mirror's cosines to the shading normal are one.
+            // The cosines of a mirror to the shading normal cancel.
             let is_mirrored = branch.is_delta && branch.passes.is_none();
             let of_shading = if is_mirrored { v } else { branch.direction }
                 .dot(branch.normal)
@@ -97,7 +97,7 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
                 .max(1e-6);
             scattered *= arriving(branch.normal) * branch.direction.dot(met.normals.geometric).abs() / of_shading;
         }
-        // Russian roulette that keeps the photons' powers alike.
+        // Russian roulette that keeps the photons' powers similar.
         let probability = (scattered.max_element() / flux.max_element()).min(1.0);
         if survival >= probability {
             return Ending::Absorbed;

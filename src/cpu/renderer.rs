@@ -1,4 +1,4 @@
-//! A plain progressive photon mapper: the paper's algorithm step by step, with nothing that only makes it quicker.
+//! A plain progressive photon mapper: the paper's algorithm step by step, without optimisations.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -28,34 +28,34 @@ use crate::record::{Launch, Run};
 use crate::scene::Camera;
 use crate::sizes::PPM_SLOTS;
 
-/// Photon paths that are followed before their photons are gathered.
+/// Photon paths that are traced before their photons are gathered.
 const BATCH: u32 = 1 << 18;
 
-/// A progressive render on the CPU, with all threads of rayon's pool.
+/// A progressive render on the CPU, on all threads of rayon's pool.
 pub struct Renderer {
     scene: PackedScene,
     config: RenderConfig,
     settings: Settings,
-    /// Visible points that a pixel can have.
-    room: usize,
-    /// Of each pixel, row by row from the top left.
+    /// Visible points per pixel at most.
+    pixel_slots: usize,
+    /// One per pixel, row by row from the top left.
     paths: Vec<CameraPath>,
     pixels: Vec<Pixel>,
-    /// Those of a pixel lie together.
+    /// The slots of a pixel are contiguous.
     slots: Vec<Slot>,
     /// Median of the initial radii.
     radius: f32,
     photon_flux: Option<f64>,
     totals: Totals,
     counters: Counters,
-    made: Instant,
+    created: Instant,
 }
 
 impl Renderer {
-    /// Prepares a render: finds the radius.
+    /// Prepares a render: chooses the initial radii.
     ///
     /// # Errors
-    /// A setting outside its range, or more photons in a batch than the kd-tree can number.
+    /// A setting outside its range, or more photons in a batch than the k-d tree can index.
     pub fn new(scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
         config.check()?;
         let method = &METHODS[config.gather.unwrap_or_else(default_cpu_method)];
@@ -64,7 +64,7 @@ impl Renderer {
             return Err(Error::setting(Setting::Gather, what));
         }
         let splits = scene.features.dielectric || scene.features.glossy;
-        let room = match config.estimator {
+        let pixel_slots = match config.estimator {
             Estimator::Ppm if splits => PPM_SLOTS as usize,
             _ => 1,
         };
@@ -73,21 +73,21 @@ impl Renderer {
             scene: scene.clone(),
             settings: settings(&config, scene, camera, u32::MAX),
             config,
-            room,
+            pixel_slots,
             paths: Vec::new(),
             pixels: vec![Pixel::default(); pixels],
-            slots: vec![Slot::default(); pixels * room],
+            slots: vec![Slot::default(); pixels * pixel_slots],
             radius: 0.0,
             photon_flux: None,
             totals: Totals::default(),
             counters: Counters::default(),
-            made: Instant::now(),
+            created: Instant::now(),
         };
         renderer.choose_radii()?;
         Ok(renderer)
     }
 
-    /// What rays read.
+    /// What tracing functions read.
     pub fn inputs(&self) -> Inputs<'_> {
         Inputs {
             scene: &self.scene,
@@ -96,22 +96,23 @@ impl Renderer {
         }
     }
 
-    /// R², N and τ of all visible points that pixels can have.
+    /// R², N and τ of all slots.
     pub fn statistics(&self) -> impl Iterator<Item = &Statistics> {
         self.slots.iter().map(|slot| &slot.statistics)
     }
 
-    /// Each pixel's visible points, and what their paths saw.
+    /// Traces a camera path for each pixel.
     pub fn trace_camera_paths(&self, turn: CameraTurn) -> Vec<CameraPath> {
         let width = self.config.resolution[0] as usize;
         let of_pixel = |pixel: usize| {
             let pixel = [(pixel % width) as u32, (pixel / width) as u32];
-            trace_camera_path(&self.inputs(), pixel, turn, self.room)
+            trace_camera_path(&self.inputs(), pixel, turn, self.pixel_slots)
         };
         (0..self.pixels.len()).into_par_iter().map(of_pixel).collect()
     }
 
-    /// The photons of these paths of an iteration, in the paths' order, and how many paths ended in which way.
+    /// Traces these photon paths of an iteration. Returns the photons in path order, and how many paths were truncated and not
+    /// finite.
     pub fn trace_photon_paths(&self, iteration: u32, paths: Range<u32>) -> (Vec<Photon>, [u64; 2]) {
         let inputs = self.inputs();
         let chunks: Vec<u32> = paths.clone().step_by(1024).collect();
@@ -137,7 +138,7 @@ impl Renderer {
         let discs = Discs {
             paths: &self.paths,
             slots: &self.slots,
-            room: self.room,
+            pixel_slots: self.pixel_slots,
         };
         match METHODS[self.config.gather.unwrap_or_else(default_cpu_method)].runs {
             Runs::CpuNaive => gather_naive(&discs, photons),
@@ -145,23 +146,23 @@ impl Renderer {
         }
     }
 
-    /// The user's radius, or first radii from the density of pilot photons: one that suits the median visible point, then smaller
-    /// ones where the photons are denser.
+    /// The user's radius, or initial radii from the density of pilot photons: one for the median visible point, then smaller ones
+    /// where photons are denser.
     fn choose_radii(&mut self) -> Result<()> {
         self.paths = self.trace_camera_paths(CameraTurn::FIRST);
         if self.config.radius.is_none() {
             let batch = self.config.photons.min(BATCH);
-            // The pilot is a batch; the densities of the whole iteration's photons are higher.
+            // The pilot is one batch; a whole iteration has a higher density.
             let share = batch as f32 / self.config.photons as f32;
             let (photons, _) = self.trace_photon_paths(radius::PILOT, 0..batch);
             self.photon_flux = radius::mean_flux(&photons);
             let seen = self.paths.iter().flat_map(|path| &path.points);
-            let as_kernels_have_it = seen.map(|point| {
-                let mut as_they = layout::VisiblePoint::zeroed();
-                as_they.position_object = with_word(point.surface.position, point.surface.object);
-                (as_they, point.footprint as f32)
+            let as_on_device = seen.map(|point| {
+                let mut packed = layout::VisiblePoint::zeroed();
+                packed.position_object = with_word(point.surface.position, point.surface.object);
+                (packed, point.footprint as f32)
             });
-            let (points, footprints): (Vec<_>, Vec<_>) = as_kernels_have_it.unzip();
+            let (points, footprints): (Vec<_>, Vec<_>) = as_on_device.unzip();
             let [first, _] = radius::first(&points, &footprints, &photons, share);
             self.settings.first_footprints[0] = first.footprints;
             let wanted = f64::from(first.photons as f32 * share);
@@ -171,7 +172,7 @@ impl Renderer {
                 for (index, gathered) in gathered.iter().enumerate() {
                     let found = f64::from(gathered.count);
                     if found > wanted {
-                        let point = &self.paths[index / self.room].points[index % self.room];
+                        let point = &self.paths[index / self.pixel_slots].points[index % self.pixel_slots];
                         let radius2 = &mut self.slots[index].statistics.radius2;
                         let least2 = (f64::from(LEAST_FOOTPRINTS) * point.footprint).powi(2);
                         *radius2 = (*radius2 * wanted / found).max(radius2.min(least2));
@@ -192,10 +193,11 @@ impl Renderer {
         Ok(())
     }
 
-    /// The discs of the visible points. A slot's first one sets its R; no disc is larger than a multiple of the pixel's footprint.
+    /// Sets the discs of the visible points. A slot's first visible point sets its R; a disc is at most a multiple of the
+    /// footprint.
     fn find_discs(&mut self) {
         let settings = &self.settings;
-        for (path, slots) in self.paths.iter().zip(self.slots.chunks_mut(self.room)) {
+        for (path, slots) in self.paths.iter().zip(self.slots.chunks_mut(self.pixel_slots)) {
             for (point, slot) in path.points.iter().zip(slots) {
                 let radius2 = &mut slot.statistics.radius2;
                 if *radius2 == 0.0 {
@@ -215,25 +217,25 @@ impl Renderer {
         }
     }
 
-    /// Adds what the paths' pixels see directly.
+    /// Adds emission and direct light of the pixels' paths.
     fn add_direct(&mut self, turn: CameraTurn) {
         let inputs = Inputs {
             scene: &self.scene,
             settings: &self.settings,
             config: &self.config,
         };
-        let asks =
+        let through_glass =
             turn.path == 0 && inputs.scene.features.dielectric && inputs.config.asks_behind_glass(turn.iteration);
         let of_pixel = |(index, (pixel, path)): (usize, (&mut Pixel, &CameraPath))| {
             let mut radiance = path.emitted;
             if inputs.config.direct == Direct::Light {
                 let mut random = Random::of_pixel(inputs.config, PathKind::LightSample, index as u32, turn);
                 for point in &path.points {
-                    let light = direct_light(&inputs, point, asks, &mut random);
+                    let light = direct_light(&inputs, point, through_glass, &mut random);
                     radiance += light.radiance;
                     pixel.unbent += light.unbent;
                 }
-                pixel.asked += u32::from(asks);
+                pixel.unbent_iterations += u32::from(through_glass);
             }
             radiance /= f64::from(turn.paths);
             pixel.direct += radiance;
@@ -248,7 +250,7 @@ impl Renderer {
         self.counters.truncated_paths += self.paths.iter().map(|path| path.truncated).sum::<u64>();
     }
 
-    /// Asks points of the discs whether they can have photons; and as long as a pixel has none, whether any can come.
+    /// Samples the coverage of discs; for pixels without photons, whether a surface surrounds the point.
     fn add_coverage(&mut self, iteration: u32, gathered: &[Gathered]) {
         let inputs = Inputs {
             scene: &self.scene,
@@ -273,9 +275,10 @@ impl Renderer {
                     object: point.surface.object,
                 };
                 let mut random = Random::of_disc(inputs.config, index as u32, iteration, points);
-                let trusted = slot.covered == f64::from(slot.asked) && slot.asked >= COVERAGE_TRUSTED;
+                let trusted =
+                    slot.covered == f64::from(slot.coverage_iterations) && slot.coverage_iterations >= COVERAGE_TRUSTED;
                 if slot.statistics.accepted == 0 && gathered.count == 0 {
-                    random.skip_to(COVERAGE_WHOLE); // those of the disc come before
+                    random.skip_to(COVERAGE_WHOLE); // after the numbers of the disc
                     let [u, v, ..] = random.next4();
                     pixel.surrounded |= is_surrounded(&inputs, place, [u, v]);
                 } else if !trusted || iteration.is_multiple_of(8) {
@@ -284,19 +287,19 @@ impl Renderer {
                         can_have_photons(&inputs, place, slot.disc.sqrt(), [u, v])
                     });
                     slot.covered += covered.count() as f64 / f64::from(points);
-                    slot.asked += 1;
+                    slot.coverage_iterations += 1;
                 }
             });
     }
 
-    /// Takes the photons of an iteration, of so many paths.
-    fn take(&mut self, iteration: u32, emitted: u32, gathered: &[Gathered]) {
+    /// Updates the statistics with an iteration's photons.
+    fn update(&mut self, iteration: u32, emitted: u32, gathered: &[Gathered]) {
         let alpha = f64::from(self.config.alpha);
         for (index, gathered) in gathered.iter().enumerate().filter(|(_, gathered)| gathered.count > 0) {
-            let (pixel, number) = (index / self.room, index % self.room);
+            let (pixel, number) = (index / self.pixel_slots, index % self.pixel_slots);
             let throughput = self.paths[pixel].points[number].throughput;
             let slot = &mut self.slots[index];
-            // τ is that of a disc of R. A smaller one has been gathered from where that has a bound.
+            // τ is that of a disc of R. A smaller disc has been gathered where the radius is bounded.
             let larger = slot.statistics.radius2 / slot.disc;
             let of_disc = Statistics {
                 flux: throughput * gathered.flux * larger,
@@ -306,7 +309,8 @@ impl Renderer {
                 flux: DVec3::splat(mean(throughput) * gathered.curvature(slot.disc) * larger),
                 ..of_disc
             };
-            let [radiance, curvature] = [of_disc, curvature].map(|part| part.radiance(slot.share(), emitted.into()));
+            let [radiance, curvature] =
+                [of_disc, curvature].map(|part| part.radiance(slot.covered_fraction(), emitted.into()));
             let sequence = (iteration % SEQUENCES) as usize;
             self.pixels[pixel].sequences[sequence] += radiance.extend(curvature.x);
             slot.statistics.take(gathered.count, of_disc.flux, alpha);
@@ -318,7 +322,7 @@ impl Backend for Renderer {
     fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
         let iteration = self.totals.iterations;
         let mut clock = Clock {
-            made: self.made,
+            created: self.created,
             run: Run::default(),
         };
         let mut turn = CameraTurn::that_gathers(&self.config, iteration);
@@ -333,7 +337,7 @@ impl Backend for Renderer {
                 if iteration > 0 {
                     return Ok(None);
                 }
-                // More camera paths could take longer than what was cut.
+                // More camera paths could take longer than the photons that were skipped.
                 turn.paths = 1;
                 break;
             }
@@ -349,7 +353,7 @@ impl Backend for Renderer {
         if self.config.estimator == Estimator::Sppm {
             clock.time("coverage", || self.add_coverage(iteration, &gathered));
         }
-        clock.time("update", || self.take(iteration, emitted, &gathered));
+        clock.time("update", || self.update(iteration, emitted, &gathered));
         for turn in turn.others() {
             self.paths = clock.time("camera", || self.trace_camera_paths(turn));
             clock.time("direct", || self.add_direct(turn));
@@ -370,11 +374,11 @@ impl Backend for Renderer {
         self.counters.photons_accepted = self.statistics().map(|statistics| statistics.accepted).sum();
         let totals = self.totals.at_least_one();
         let mut non_finite = 0;
-        // What f32 can't hold is black.
+        // Values beyond f32 are black.
         let rounded = |value: DVec4| Some(value.as_vec4()).filter(|value| value.is_finite());
         let (mut film, mut behind_glass) = (Vec::new(), Vec::new());
         for (index, pixel) in self.pixels.iter().enumerate() {
-            let slots = &self.slots[index * self.room..][..self.room];
+            let slots = &self.slots[index * self.pixel_slots..][..self.pixel_slots];
             let (radiance, glass) = pixel.resolve(&self.paths[index].points, slots, totals);
             let waits = pixel.surrounded && slots.iter().all(|slot| slot.statistics.accepted == 0);
             let alpha = pixel.met as f32 / totals.camera_paths as f32;
@@ -440,9 +444,9 @@ impl Backend for Renderer {
     }
 }
 
-/// Notes when steps run.
+/// Measures the steps.
 struct Clock {
-    made: Instant,
+    created: Instant,
     run: Run,
 }
 
@@ -454,7 +458,7 @@ impl Clock {
         self.run.wall += duration;
         self.run.launches.push(Launch {
             stage,
-            begin_ns: (begin - self.made).as_secs_f64() * 1e9,
+            begin_ns: (begin - self.created).as_secs_f64() * 1e9,
             duration_ns: duration.as_secs_f64() * 1e9,
         });
         result

@@ -1,11 +1,11 @@
-//! Directions and points from uniform numbers, and directions in 32 bits: `glsl/common/sampling.glsl` in f64.
+//! Sampled directions and points, and directions packed into 32 bits: `glsl/common/sampling.glsl` in f64.
 
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec2, DVec3};
 
 /// An orthonormal basis around the unit vector `n`: Duff and others, «Building an Orthonormal Basis, Revisited», 2017.
-/// The very same basis as the device's, so that the same numbers give the same direction.
+/// The same basis as on the device, so that the same numbers give the same direction.
 pub(super) fn basis(n: DVec3) -> DMat3 {
     let s = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (s + n.z);
@@ -51,13 +51,13 @@ pub(super) fn triangle_point(u: f64, v: f64) -> (f64, f64) {
     (1.0 - s, v * s)
 }
 
-/// Mirrors the octahedron's lower half onto the square's corners, and back.
+/// Reflects the octahedron's lower half to the square's corners, and back.
 fn fold(x: f64, y: f64) -> (f64, f64) {
     let sign = |value: f64| if value >= 0.0 { 1.0 } else { -1.0 };
     ((1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y))
 }
 
-/// Unit vector to two 16-bit numbers by the octahedral map: Cigolle and others, «A Survey of Efficient Representations
+/// Encodes a unit vector in two 16-bit numbers by the octahedral map: Cigolle and others, «A Survey of Efficient Representations
 /// for Independent Unit Vectors», JCGT 3(2), 2014.
 pub fn encode_direction(d: DVec3) -> u32 {
     let p = d / d.abs().element_sum();
@@ -66,7 +66,7 @@ pub fn encode_direction(d: DVec3) -> u32 {
     quantise(x) | quantise(y) << 16
 }
 
-/// The unit vector that [`encode_direction`] made the code of, within 6.5e-5 rad.
+/// Decodes a unit vector from [`encode_direction`], within 6.5e-5 rad.
 pub fn decode_direction(code: u32) -> DVec3 {
     let value = |bits: u32| (f64::from(bits as u16 as i16) / 32767.0).max(-1.0);
     let (x, y) = (value(code), value(code >> 16));

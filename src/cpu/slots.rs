@@ -1,4 +1,4 @@
-//! What pixels and their visible points keep from iteration to iteration.
+//! State of pixels and slots between iterations.
 
 use bytemuck::Zeroable;
 use glam::{DVec3, DVec4};
@@ -11,53 +11,53 @@ use super::vector::mean;
 use crate::config::{SEQUENCES, Totals};
 use crate::layout::BehindGlass;
 
-/// What a visible point gathers into; one for each that a pixel can have.
+/// Statistics of a visible point; a pixel has one slot for each visible point that its path can have.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Slot {
     pub statistics: Statistics,
     /// R² of this iteration's disc.
     pub disc: f64,
-    /// Iterations in which it was asked what part of the disc can have photons, and the sum of those parts.
-    pub asked: u32,
+    /// Iterations in which the disc's coverage was sampled, and the sum of the covered fractions.
+    pub coverage_iterations: u32,
     pub covered: f64,
 }
 
 impl Slot {
-    /// The part of the disc that can have photons; 1 where nothing is known of it.
-    pub fn share(&self) -> f64 {
+    /// The fraction of the disc that can receive photons; 1 if unknown.
+    pub fn covered_fraction(&self) -> f64 {
         if self.covered > 0.0 {
-            self.covered / f64::from(self.asked)
+            self.covered / f64::from(self.coverage_iterations)
         } else {
             1.0
         }
     }
 }
 
-/// What a pixel has seen.
+/// State of a pixel.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Pixel {
-    /// Sum over the iterations of what was seen directly.
+    /// Emission and direct light, summed over the iterations.
     pub direct: DVec3,
-    /// RGB and curvature of the iterations of each sequence.
+    /// RGB and curvature, summed over the iterations of each sequence.
     pub sequences: [DVec4; SEQUENCES as usize],
-    /// Sum of the light behind glass, and how often that was asked for.
+    /// Unrefracted light behind glass, and the iterations in which it was sampled.
     pub unbent: f64,
-    pub asked: u32,
-    /// Camera paths that met a surface.
+    pub unbent_iterations: u32,
+    /// Camera paths that hit a surface.
     pub met: u32,
-    /// Whether photons may be expected.
+    /// Whether a surface surrounds the point, so that photons may still arrive.
     pub surrounded: bool,
 }
 
 impl Pixel {
-    /// Radiance, and what tells of light behind glass, from its visible points and their slots.
+    /// Radiance, and the statistics of light behind glass, from the pixel's visible points and slots.
     pub fn resolve(&self, points: &[VisiblePoint], slots: &[Slot], totals: Totals) -> (DVec3, BehindGlass) {
-        let of_slot = |slot: &Slot| slot.statistics.radiance(slot.share(), totals.emitted);
+        let of_slot = |slot: &Slot| slot.statistics.radiance(slot.covered_fraction(), totals.emitted);
         let by_photons: DVec3 = slots.iter().map(of_slot).sum();
         let mut glass = BehindGlass::zeroed();
         glass.arrived = mean(by_photons) as f32;
         if self.unbent > 0.0 {
-            glass.unbent = (self.unbent / f64::from(self.asked)) as f32;
+            glass.unbent = (self.unbent / f64::from(self.unbent_iterations)) as f32;
             for (slot, point) in slots.iter().zip(points) {
                 let radius2 = slot.statistics.radius2;
                 glass.photons = glass.photons.max(slot.statistics.accepted as f32);
@@ -69,16 +69,18 @@ impl Pixel {
     }
 }
 
-/// The visible points with the discs of this iteration.
+/// The visible points with this iteration's discs.
 pub(super) struct Discs<'a> {
     pub paths: &'a [CameraPath],
     pub slots: &'a [Slot],
-    pub room: usize,
+    pub pixel_slots: usize,
 }
 
 impl Discs<'_> {
     fn point(&self, index: usize) -> Option<&VisiblePoint> {
-        self.paths[index / self.room].points.get(index % self.room)
+        self.paths[index / self.pixel_slots]
+            .points
+            .get(index % self.pixel_slots)
     }
 }
 
@@ -96,7 +98,7 @@ impl Receivers for Discs<'_> {
         })
     }
 
-    /// Photons have the cosine to the shading normal in their flux.
+    /// The photons' flux includes the cosine to the shading normal.
     fn response(&self, index: usize, l: DVec3) -> DVec3 {
         self.point(index).map_or(DVec3::ZERO, |point| {
             let cosine = l.dot(point.bsdf.normals().shading);

@@ -6,19 +6,19 @@ use glam::{DVec3, Vec4};
 
 use crate::layout::{self, SMALLEST_RADIUS2};
 
-/// What a visible point has gathered in all iterations.
+/// Photon statistics of a visible point over all iterations.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Statistics {
     /// R².
     pub radius2: f64,
-    /// Photons: N is α times this, which is what equation 2's recurrence sums up to.
+    /// Number of photons: N is α times this, the sum of equation 2's recurrence.
     pub accepted: u64,
     /// τ.
     pub flux: DVec3,
 }
 
 impl Statistics {
-    /// Equations 2 and 3: takes M photons with their flux, and shrinks the disc.
+    /// Equations 2 and 3: adds M photons with their flux, and shrinks the disc.
     pub fn take(&mut self, photons: u32, flux: DVec3, alpha: f64) {
         if photons == 0 {
             return;
@@ -35,7 +35,7 @@ impl Statistics {
         self.accepted += u64::from(photons);
     }
 
-    /// Equation 4, for so many emitted paths. `covered`: the part of the disc that can have photons.
+    /// Equation 4, for this number of emitted paths. `covered`: the fraction of the disc that can receive photons.
     pub fn radiance(&self, covered: f64, emitted: u64) -> DVec3 {
         if self.radius2 > 0.0 {
             self.flux / (PI * self.radius2 * covered * emitted as f64)
@@ -45,7 +45,7 @@ impl Statistics {
     }
 }
 
-/// As the kernels have it, without the flux's curvature.
+/// From the kernels' statistics, without the flux's curvature.
 impl From<&layout::Statistics> for Statistics {
     fn from(statistics: &layout::Statistics) -> Self {
         let flux = Vec4::from(statistics.flux_high).as_dvec4() + Vec4::from(statistics.flux_low).as_dvec4();
@@ -69,7 +69,7 @@ mod tests {
             ..Statistics::default()
         };
         statistics.take(photons, DVec3::ONE, alpha);
-        // All of the first photons are new: N = 0, M = 9, and 6 of them stay.
+        // Initially N = 0. M = 9, and 6 of these photons remain.
         assert!((statistics.radius2 - 4.0 * alpha).abs() < 1e-15);
         assert!((statistics.flux - DVec3::splat(alpha)).length() < 1e-15);
         let before = statistics;

@@ -1,4 +1,4 @@
-//! A point of a surface, and where rays leave it.
+//! Surface points and ray origins.
 
 use glam::{DMat3, DVec3};
 
@@ -8,36 +8,36 @@ use super::vector::word;
 use crate::layout::{Material, RANK, ROUNDINGS, SMOOTH_SHADED, ShadingTriangle};
 use crate::packing::PackedScene;
 
-/// A point of a triangle.
+/// A point on a triangle.
 #[derive(Debug, Clone, Copy)]
 pub struct Surface {
-    /// Which triangle.
+    /// The triangle.
     pub triangle: PlacedTriangle,
-    /// Barycentric coordinates of its second and third corner.
+    /// Barycentric coordinates of the second and the third corner.
     pub uv: [f64; 2],
-    /// Render units.
+    /// In render units.
     pub position: DVec3,
-    /// Largest coordinates of the triangle's corners, or what those are sums of, without their signs.
+    /// Bound of the coordinates for rounding errors: largest absolute coordinates of the corners, or of the terms that make them.
     pub reach: DVec3,
     /// Unit vector on the triangle's front.
     pub geometric_normal: DVec3,
     /// On the same side.
     pub shading_normal: DVec3,
-    /// Likewise, of a clear coat.
+    /// The clear coat's normal, on the same side.
     pub coat_normal: DVec3,
-    /// Its index.
+    /// Index of the object.
     pub object: u32,
-    /// Without its textures, until [`super::texture::apply_textures`].
+    /// Without textures, until [`super::texture::apply_textures`].
     pub material: Material,
-    /// Its index.
+    /// Index of the material.
     pub material_index: u32,
-    /// Index of its light, or [`crate::layout::NO_LIGHT`].
+    /// Index of the light, or [`crate::layout::NO_LIGHT`].
     pub light: u32,
-    /// Of the triangle.
+    /// The triangle's flags.
     pub flags: u32,
 }
 
-/// The point with the barycentric coordinates `u` and `v` of the second and the third corner.
+/// The point at the barycentric coordinates `u` and `v` of the second and the third corner.
 pub fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64) -> Surface {
     let triangle = &scene.shading_triangles[at.triangle as usize];
     let [p0, p1, p2] = at.corners(scene);
@@ -50,7 +50,7 @@ pub fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64) -> Su
         if placement.is_mirrored() {
             geometric_normal = -geometric_normal;
         }
-        // So much the corners are uncertain by against those of other objects in the same place.
+        // The uncertainty of the corners relative to those of coincident objects.
         reach = placement.reach().as_dvec3();
         let instance = &scene.instances[index as usize];
         object = instance.object;
@@ -74,13 +74,13 @@ pub fn surface_at(scene: &PackedScene, at: PlacedTriangle, u: f64, v: f64) -> Su
     }
 }
 
-/// The point that a ray met.
+/// The point that a ray hit.
 pub fn surface_of(scene: &PackedScene, hit: Hit) -> Surface {
     surface_at(scene, hit.at, hit.u, hit.v)
 }
 
 impl Surface {
-    /// Where a ray starts that leaves in `direction`: on the side that it flies to.
+    /// The origin of a ray in `direction`, offset to the side that it leaves on.
     pub fn origin_towards(&self, direction: DVec3) -> DVec3 {
         let n = self.geometric_normal;
         let n = if direction.dot(n) >= 0.0 { n } else { -n };
@@ -103,7 +103,7 @@ fn interpolated_normal(
         normal_matrix.map_or(normal, |matrix| (matrix * normal).normalize())
     });
     let n = (1.0 - u - v) * n0 + u * n1 + v * n2;
-    // Normals that cancel, or point to the back, say nothing.
+    // Interpolated normals that cancel, or point to the back, are ignored.
     if n.length_squared() > 1e-12 && n.dot(geometric_normal) > 0.0 {
         n.normalize()
     } else {
@@ -111,33 +111,32 @@ fn interpolated_normal(
     }
 }
 
-/// Moves a ray's origin off its surface, to the side of `n`, by a bound of the rounding errors that positions and planes
-/// of triangles with corners up to `reach` have on a device: Pharr, Jakob and Humphreys, «Physically Based Rendering»,
-/// 3rd edition, 2016, section 3.9.5.
+/// Offsets a ray's origin to the side of `n` by a bound of the rounding errors of positions and planes of triangles with corners
+/// up to `reach`: Pharr, Jakob and Humphreys, «Physically Based Rendering», 3rd edition, 2016, section 3.9.5.
 pub fn offset_origin(position: DVec3, n: DVec3, reach: DVec3) -> DVec3 {
     position + ROUNDINGS * n.abs().dot(reach) * n
 }
 
-/// The normals of a surface, turned to the side that a path comes from.
+/// The normals of a surface, on the side that a path comes from.
 #[derive(Debug, Clone, Copy)]
 pub struct Normals {
     /// Of the triangle.
     pub geometric: DVec3,
-    /// Interpolated, or of a texture.
+    /// Interpolated, or from a normal map.
     pub shading: DVec3,
     /// Of a clear coat.
     pub coat: DVec3,
-    /// The path meets the triangle's front.
+    /// The path hits the triangle's front.
     pub front: bool,
 }
 
 impl Normals {
-    /// Those that are seen from `v`, a unit vector away from the surface; given on the triangle's front: geometric, shading, coat.
+    /// From the normals on the triangle's front (geometric, shading, coat). `v`: unit vector away from the surface.
     pub fn of([geometric, shading, coat]: [DVec3; 3], v: DVec3) -> Self {
         let front = v.dot(geometric) > 0.0;
         let side = if front { 1.0 } else { -1.0 };
         let geometric = side * geometric;
-        // Past another normal's horizon the geometric normal stands in.
+        // Below the horizon of another normal the geometric normal is used.
         let facing = |n: DVec3| if v.dot(side * n) > 0.0 { side * n } else { geometric };
         Self {
             geometric,

@@ -1,4 +1,4 @@
-//! What a surface's material is at a place: `glsl/bsdf/material.glsl`, and `glsl/trace/opacity.glsl`.
+//! Textures and opacity: `glsl/bsdf/material.glsl` and `glsl/trace/opacity.glsl`.
 
 use glam::{DVec2, DVec3, DVec4};
 use half::f16;
@@ -12,11 +12,11 @@ use crate::layout::{BLEND, MASK, Material, NO_TEXTURE, SEE_THROUGH, TEXTURE_FACT
 use crate::packing::PackedScene;
 use crate::random::Random;
 
-/// What a place of a triangle has for textures.
+/// Texture coordinates, vertex colour and tangent at a point.
 struct Place {
     sets: [DVec2; 2],
     color: DVec4,
-    /// w: the bitangent's side, 0 where there is none.
+    /// w: the bitangent's sign, 0 without a tangent.
     tangent: DVec4,
 }
 
@@ -39,7 +39,7 @@ impl Place {
             let mut side = f64::from(corner.bitangent);
             let mut tangent = decode_direction(corner.tangent);
             if let Some(placement) = placement {
-                // It follows the surface as its edges do. Mirroring turns normal × tangent round, but not the bitangent.
+                // The tangent transforms like an edge. Mirroring flips normal × tangent, but not the bitangent.
                 tangent = placement.map().transform_vector3(tangent).normalize();
                 side = if placement.is_mirrored() { -side } else { side };
             }
@@ -49,13 +49,13 @@ impl Place {
     }
 }
 
-/// The value of a texture, or `None` where there is none.
+/// The value of a texture; `None` if there is no texture.
 fn value(scene: &PackedScene, texture: u32, place: &Place) -> Option<DVec4> {
     let lookup = (texture != NO_TEXTURE).then(|| &scene.textures[texture as usize])?;
     Some(lookup.value(&scene.texels, place.sets))
 }
 
-/// Gives a surface the material of its place. A texture of normals turns its shading normal.
+/// Applies textures to a surface's material, and normal maps to its normals.
 pub fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
     if surface.flags & TEXTURED_TRIANGLE == 0 {
         return;
@@ -87,7 +87,7 @@ pub fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
     (surface.shading_normal, surface.coat_normal) = (shading, coat);
 }
 
-/// The normal that a texture leans `n` to, on the side of the geometric one.
+/// The normal `n` perturbed by a normal map, if it stays on the geometric normal's side.
 fn leaning_normal(n: DVec3, surface: &Surface, place: &Place, value: DVec3, scale: f64) -> DVec3 {
     let t = place.tangent.truncate();
     let t = t - t.dot(n) * n;
@@ -105,8 +105,8 @@ fn leaning_normal(n: DVec3, surface: &Surface, place: &Place, value: DVec3, scal
     }
 }
 
-/// The part of a surface that is there, at its place.
-pub fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
+/// The probability that a ray hits the surface.
+pub fn opacity(scene: &PackedScene, surface: &Surface) -> f64 {
     if surface.flags & SEE_THROUGH == 0 {
         return 1.0;
     }
@@ -123,13 +123,13 @@ pub fn share_there(scene: &PackedScene, surface: &Surface) -> f64 {
     }
 }
 
-/// Whether a ray finds a face there: by chance where it isn't there everywhere, a pure function of the ray's place in its path.
-pub(super) fn is_face_there(scene: &PackedScene, surface: &Surface, at: PlacedTriangle, random: &Random) -> bool {
-    let thing = [at.triangle, at.instance.map_or(0, |instance| instance + 1)];
-    random.number_of(thing) < share_there(scene, surface)
+/// Whether a ray hits a partly transparent face: random, but a pure function of the ray's position in its path.
+pub(super) fn is_hit(scene: &PackedScene, surface: &Surface, at: PlacedTriangle, random: &Random) -> bool {
+    let face = [at.triangle, at.instance.map_or(0, |instance| instance + 1)];
+    random.number_of(face) < opacity(scene, surface)
 }
 
-/// As [`nearest_hit`](super::intersect::nearest_hit), by chance through what is there in part.
+/// As [`nearest_hit`](super::intersect::nearest_hit), passing partly transparent faces at random.
 pub(super) fn nearest_visible(
     inputs: &Inputs<'_>,
     ray: Ray,
@@ -137,11 +137,11 @@ pub(super) fn nearest_visible(
     ignored: Option<PlacedTriangle>,
     random: &Random,
 ) -> Option<Hit> {
-    nearest_seen(inputs, ray, t_max, ignored, false, random)
+    nearest_visible_culled(inputs, ray, t_max, ignored, false, random)
 }
 
-/// The same, with `culls` through backs that no camera sees.
-pub(super) fn nearest_seen(
+/// The same; with `culls`, culled back faces are ignored.
+pub(super) fn nearest_visible_culled(
     inputs: &Inputs<'_>,
     ray: Ray,
     t_max: f64,
@@ -153,7 +153,7 @@ pub(super) fn nearest_seen(
     loop {
         let hit = nearest_hit_from(inputs, ray, progress, t_max, ignored)?;
         let met = surface_of(inputs.scene, hit);
-        if !(culls && is_hidden_back(&met, ray.direction)) && is_face_there(inputs.scene, &met, hit.at, random) {
+        if !(culls && is_hidden_back(&met, ray.direction)) && is_hit(inputs.scene, &met, hit.at, random) {
             return Some(hit);
         }
         progress = Progress::past(hit);

@@ -6,7 +6,7 @@ use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3};
 use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::RenderConfig;
-use ppm_vk::internals::cpu::{self, SeenByKernels};
+use ppm_vk::internals::cpu::{self, DeviceReceivers};
 use ppm_vk::internals::film::Image;
 use ppm_vk::internals::gpu::Device;
 use ppm_vk::internals::layout::{
@@ -134,8 +134,8 @@ pub struct Seen {
 
 impl Seen {
     /// As the CPU gathers at them, with R² of each.
-    pub fn with<'a>(&'a self, radii2: &'a [f32]) -> SeenByKernels<'a> {
-        SeenByKernels {
+    pub fn with<'a>(&'a self, radii2: &'a [f32]) -> DeviceReceivers<'a> {
+        DeviceReceivers {
             points: &self.points,
             bsdfs: &self.bsdfs,
             radii2,

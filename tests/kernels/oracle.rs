@@ -3,7 +3,7 @@
 use glam::DVec3;
 use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::{Accel, Direct, RenderConfig};
-use ppm_vk::internals::cpu::{self, Inputs, Ray, Renderer, SeenByKernels};
+use ppm_vk::internals::cpu::{self, DeviceReceivers, Inputs, Ray, Renderer};
 use ppm_vk::internals::film::Image;
 use ppm_vk::internals::layout::{Settings, VisiblePoint};
 use ppm_vk::internals::metrics;
@@ -96,7 +96,7 @@ fn the_kd_tree_finds_what_testing_every_photon_finds() {
     let (photons, _) = plain.trace_photon_paths(0, 0..bench.config.photons);
     for radius in [0.2, 1.0, 5.0] {
         let radii2 = vec![(radius * plain.radius()).powi(2); points.len()];
-        let seen = SeenByKernels {
+        let seen = DeviceReceivers {
             points: &points,
             bsdfs: &[],
             radii2: &radii2,

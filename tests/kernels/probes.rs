@@ -377,7 +377,7 @@ fn scattered_photons_carry_brdf_times_cosine_over_density() {
 
 #[test]
 fn boundaries_of_glass_are_those_of_f64() {
-    let (mut turns, mut values) = (Agreement::default(), Agreement::default());
+    let (mut samples, mut values) = (Agreement::default(), Agreement::default());
     let mut total = 0;
     for (asked, found, case) in bsdf_probe(COUNT) {
         let (n, geometric, v) = (case.normals.shading, case.normals.geometric, case.v);
@@ -386,15 +386,16 @@ fn boundaries_of_glass_are_those_of_f64() {
             "index {} of {asked:?}",
             found.outgoing[3]
         );
-        let expected = case.glass.turns(n, geometric, v, [case.u[0], case.u[1]]);
+        let expected = case.glass.sample(n, geometric, v, [case.u[0], case.u[1]]);
         // Next to the critical angle reflectance has an infinite slope.
         let reflectance = expected.reflected.probability;
         let steep = (1.0 - reflectance).max(1e-6);
         let tolerance = 1e-5 + 3e-6 / steep + 1e-6 / n.dot(v).max(1e-6);
         let near = |found: [f32; 4], expected: DVec3, tolerance: f64| xyz(found).distance(expected) <= tolerance;
         // Of power: what is hardly ever chosen may weigh much.
-        let near_weight = |found: [f32; 4], turn: cpu::Turn| {
-            xyz(found).distance(turn.weight) * turn.probability <= tolerance.max(1e-3) * (1.0 + turn.weight.length())
+        let near_weight = |found: [f32; 4], sample: cpu::DielectricSample| {
+            xyz(found).distance(sample.weight) * sample.probability
+                <= tolerance.max(1e-3) * (1.0 + sample.weight.length())
         };
         let mut same = (f64::from(found.reflected[3]) - reflectance).abs() <= tolerance
             && near(found.reflected, expected.reflected.direction, 1e-3)
@@ -405,7 +406,7 @@ fn boundaries_of_glass_are_those_of_f64() {
         } else {
             total += 1;
         }
-        turns.note(same, || format!("{found:?} instead of {expected:?}, {asked:?}"));
+        samples.note(same, || format!("{found:?} instead of {expected:?}, {asked:?}"));
         let (value, _) = case.glass.evaluate(n, geometric, v, case.l);
         let flat = n.dot(v) < 1e-4 || n.dot(case.l).abs() < 1e-4;
         if value.length() > 1e-6 && !flat {
@@ -421,7 +422,7 @@ fn boundaries_of_glass_are_those_of_f64() {
             });
         }
     }
-    turns.assert("boundaries", 0.998, COUNT as usize);
+    samples.assert("boundaries", 0.998, COUNT as usize);
     values.assert("lobes of rough glass", 0.999, 1500);
     assert!(total > 300, "only {total} total reflections");
 }
@@ -611,7 +612,7 @@ fn surfaces_are_what_their_textures_say_in_f64() {
                 instance: (asked.instance != u32::MAX).then_some(asked.instance),
             };
             let mut surface = cpu::surface_at(&bench.scene, at, asked.u.into(), asked.v.into());
-            let share = cpu::share_there(&bench.scene, &surface);
+            let share = cpu::opacity(&bench.scene, &surface);
             cpu::apply_textures(&bench.scene, &mut surface);
             let material = &surface.material;
             let rgbw = |rgb: [f32; 3], w: f32| [rgb[0], rgb[1], rgb[2], w];

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use ppm_vk::internals::config::{Direct, EmissionChoice, RenderConfig};
-use ppm_vk::internals::cpu::{self, SeenByKernels};
+use ppm_vk::internals::cpu::{self, DeviceReceivers};
 use ppm_vk::internals::gather::METHODS;
 use ppm_vk::internals::layout::{Gathered, Photon, Statistics, VisiblePoint};
 use ppm_vk::internals::scene::Scene;
@@ -21,7 +21,7 @@ fn assert_gathers_agree(
     radii2: &[f32],
     photons: &[Photon],
 ) -> Vec<u32> {
-    let seen = SeenByKernels {
+    let seen = DeviceReceivers {
         points,
         bsdfs: &[],
         radii2,

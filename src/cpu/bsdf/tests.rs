@@ -1,4 +1,4 @@
-//! What every BSDF has to be, whatever its formulas.
+//! Properties of every BSDF, whatever its formulas.
 
 use std::f64::consts::PI;
 
@@ -16,7 +16,7 @@ fn normals(front: bool) -> Normals {
     }
 }
 
-/// Materials with their names, by the side that light comes from.
+/// Named materials, lit from either side.
 fn bsdfs() -> Vec<(String, Bsdf)> {
     let white = Material {
         base_color: [1.0; 3],
@@ -67,7 +67,7 @@ fn towards(cosine: f64, phi: f64) -> DVec3 {
     DVec3::new(across * phi.cos(), across * phi.sin(), cosine)
 }
 
-/// Of eight cells of the sphere.
+/// Eight cells of the sphere.
 fn cell_of(l: DVec3) -> usize {
     usize::from(l.z < 0.0) * 4 + usize::from(l.z.abs() < 0.7) * 2 + usize::from(l.x < 0.0)
 }
@@ -85,9 +85,9 @@ fn integrals(value: impl Fn(DVec3) -> f64) -> [f64; 8] {
     sums
 }
 
-/// How often directions are sampled is their density's integral, and what they weigh together is that of the BSDF · cos. Means of
-/// 50,000 samples exceed six standard errors with a probability of 2·10⁻⁹; the rule of midpoints is right to 2·10⁻³ where a lobe is
-/// cut by the horizon or by a cell.
+/// Sampling frequencies match the integral of the density, and the summed weights match the integral of BSDF · cos. The mean of
+/// 50,000 samples exceeds six standard errors with a probability of 2·10⁻⁹. The midpoint rule is accurate to 2·10⁻³ where the
+/// horizon or a cell's edge cuts a lobe.
 #[test]
 fn samples_are_as_frequent_as_their_density_and_weigh_what_the_bsdf_does() {
     const SAMPLES: u32 = 50_000;
@@ -109,7 +109,7 @@ fn samples_are_as_frequent_as_their_density_and_weigh_what_the_bsdf_does() {
                     let cell = cell_of(branch.direction);
                     let radiance = branch.passes.map_or(1.0, |eta| eta * eta);
                     let weight = branch.weight.x * radiance * chance / branch.probability;
-                    // A reflection into the surface has no density, whatever takes its place.
+                    // A reflection into the surface has no density, whatever direction replaces it.
                     let counts_there = weight > 0.0 && (branch.passes.is_some() || branch.direction.z > 0.0);
                     counts[cell] += f64::from(u8::from(counts_there)) / f64::from(SAMPLES);
                     sums[cell] += weight / f64::from(SAMPLES);
@@ -140,8 +140,8 @@ fn samples_are_as_frequent_as_their_density_and_weigh_what_the_bsdf_does() {
     }
 }
 
-/// Light and viewer may change places, and nothing reflects more than it gets; radiance that passes a boundary takes the square of the
-/// indices' ratio.
+/// Reciprocity, and energy conservation. Radiance that passes a boundary scales with the square of the ratio of the refractive
+/// indices.
 #[test]
 fn light_and_viewer_change_places_and_no_light_is_made() {
     for (name, bsdf) in bsdfs() {
@@ -164,7 +164,8 @@ fn light_and_viewer_change_places_and_no_light_is_made() {
                 let branches = bsdf.branches(v, [u0, u1]);
                 sum += branches.iter().map(|branch| branch.weight.x).sum::<f64>() / f64::from(SAMPLES);
             }
-            // glTF's base gets what the boundary doesn't reflect at the half vector, which at grazing angles is more than is left.
+            // glTF's base gets what the boundary does not reflect at the half vector. At grazing angles that is more than what is
+            // left.
             let most = if name.starts_with("glossy") && !name.contains("metal 1") {
                 1.1
             } else {
