@@ -39,7 +39,7 @@ pub struct First {
 /// Initial discs of each photon map, from pilot photons. `footprints` are those of the visible points, `share` is the pilot's
 /// share of an iteration's photon paths.
 pub fn first(visible_points: &[VisiblePoint], footprints: &[f32], photons: &[Photon], share: f32) -> [First; 2] {
-    let in_map = |photon: &&Photon| photon.position_object[3].to_bits() & CAUSTIC != 0;
+    let in_map = |photon: &&Photon| photon.object & CAUSTIC != 0;
     let (caustic, global): (Vec<&Photon>, Vec<&Photon>) = photons.iter().partition(in_map);
     [(0, global), (1, caustic)].map(|(map, photons)| {
         let most = MOST_FOOTPRINTS[map];
@@ -98,13 +98,7 @@ pub fn is_dropping_worth_it(landed: u64, kept: u64, aims: bool) -> bool {
 
 /// Mean flux of photons, mean of the channels; `None` without photons.
 pub fn mean_flux(photons: &[Photon]) -> Option<f64> {
-    let flux = |photon: &Photon| {
-        photon.flux_direction[..3]
-            .iter()
-            .map(|&channel| f64::from(channel))
-            .sum::<f64>()
-            / 3.0
-    };
+    let flux = |photon: &Photon| photon.flux.iter().map(|&channel| f64::from(channel)).sum::<f64>() / 3.0;
     let sum: f64 = photons.iter().map(flux).sum();
     (sum > 0.0).then(|| sum / photons.len() as f64)
 }
@@ -205,21 +199,18 @@ fn nearest(
     let [fewest, .., most] = *candidates else {
         return Vec::new();
     };
-    let object_of = |photon: &Photon| photon.position_object[3].to_bits() & !CAUSTIC;
-    let positions: Vec<[f32; 3]> = photons
-        .iter()
-        .map(|photon| [0, 1, 2].map(|axis| photon.position_object[axis]))
-        .collect();
+    let object_of = |photon: &Photon| photon.object & !CAUSTIC;
+    let positions: Vec<[f32; 3]> = photons.iter().map(|photon| photon.position).collect();
     let seen: Vec<_> = visible_points
         .iter()
         .zip(footprints)
-        .filter(|(point, _)| point.position_object[3].to_bits() != NO_OBJECT)
+        .filter(|(point, _)| point.object != NO_OBJECT)
         .collect();
     let tree = KdTree::new(&positions);
     let step = seen.len().div_ceil(PROBES).max(1);
     let probes = seen.iter().step_by(step).map(|&(point, &footprint)| {
-        let position = [0, 1, 2].map(|axis| point.position_object[axis]);
-        let object = point.position_object[3].to_bits();
+        let position = point.position;
+        let object = point.object;
         let found = tree.nearest(position, 4 * most).into_iter();
         let on_object = found.filter(|&(_, photon)| object_of(photons[photon]) == object);
         Near {
@@ -239,6 +230,7 @@ fn nearest(
 mod tests {
     use super::*;
     use crate::random::pcg4d;
+    use bytemuck::Zeroable;
 
     /// Numbers in [0, 1), the same in every run.
     fn random(index: u32) -> [f32; 4] {
@@ -253,9 +245,8 @@ mod tests {
             .map(|i| {
                 let [x, y, ..] = random(1_000_000 + i);
                 VisiblePoint {
-                    position_object: [0.1 + 0.8 * x, 0.1 + 0.8 * y, 0.0, f32::from_bits(0)],
-                    weight_normal: [0.0; 4],
-                    emitted_normal: [0.0; 4],
+                    position: [0.1 + 0.8 * x, 0.1 + 0.8 * y, 0.0],
+                    ..VisiblePoint::zeroed()
                 }
             })
             .collect();
@@ -264,8 +255,9 @@ mod tests {
                 let [u, v, ..] = random(i);
                 let [x, y] = place(u, v);
                 Photon {
-                    position_object: [x, y, 0.0, f32::from_bits(if caustic { CAUSTIC } else { 0 })],
-                    flux_direction: [0.0; 4],
+                    position: [x, y, 0.0],
+                    object: if caustic { CAUSTIC } else { 0 },
+                    ..Photon::zeroed()
                 }
             })
             .collect();

@@ -2,8 +2,8 @@
 
 use crate::config::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
-    BehindGlass, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, GridShape, PathStart, Photon,
-    SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters, TILE, VisibleLobes, VisiblePoint,
+    BehindGlass, Centroid, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, GridShape, PathStart,
+    Photon, SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters, TILE, VisibleLobes, VisiblePoint,
     packed_bsdf_texels,
 };
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
@@ -265,7 +265,7 @@ impl Sizes {
             BufferId::ObjectCells | BufferId::ObjectCellCursors => (object_cells, 4),
             BufferId::MeshOrder | BufferId::ClusterOf => (runs * u64::from(GROUP), 4),
             BufferId::PointOrder => (u64::from(self.order_groups()) * u64::from(GROUP), 4),
-            BufferId::Centroids => (runs, 16),
+            BufferId::Centroids => (runs, size_of::<Centroid>()),
             BufferId::ClusterSizes | BufferId::ClusterStarts => (runs, 4),
             _ => return None,
         };

@@ -109,7 +109,7 @@ pub enum BufferId {
     OtherPointKeys,
     /// Slots after every other pass.
     OtherPointValues,
-    /// Centre of each cluster of visible points, vec4; w: u32 bits, its mesh.
+    /// [`crate::layout::Centroid`] of each cluster of visible points.
     Centroids,
     /// Cluster of each place of [`BufferId::MeshOrder`], u32.
     ClusterOf,

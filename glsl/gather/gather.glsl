@@ -32,12 +32,12 @@ float radius2_at(uint slot, uint map) {
 
 Receiver receiver_at(uint slot, uint map) {
     VisiblePoint point = VISIBLE_POINT(VisiblePoints, slot);
-    Receiver receiver = Receiver(point.position_object.xyz, radius2_at(slot, map),
-                                 floatBitsToUint(point.position_object.w), vec3(0.0), no_visible_bsdf());
+    Receiver receiver = Receiver(point.position, radius2_at(slot, map),
+                                 point.object, vec3(0.0), no_visible_bsdf());
     receiver.object |= receiver.object != NO_OBJECT && map == 1u ? CAUSTIC : 0u;
-    receiver.normal = decode_octahedral(floatBitsToUint(point.weight_normal.w));
+    receiver.normal = decode_octahedral(point.geometric_normal);
     if (carries_bsdf()) {
-        receiver.bsdf = LOAD_BSDF(PackedBsdfs, slot, decode_direction(floatBitsToUint(point.emitted_normal.w)));
+        receiver.bsdf = LOAD_BSDF(PackedBsdfs, slot, decode_direction(point.shading_normal));
     }
     return receiver;
 }
@@ -50,10 +50,10 @@ float squared_distance(vec3 a, vec3 b) {
 
 // The predicate of all gathers: on the same object, of the same map, within R, and arriving on the visible side.
 bool accepts(Receiver receiver, Photon photon, out float distance2) {
-    precise float cosine = dot(decode_octahedral(floatBitsToUint(photon.flux_direction.w)), receiver.normal);
-    distance2 = squared_distance(photon.position_object.xyz, receiver.position);
+    precise float cosine = dot(decode_octahedral(photon.direction), receiver.normal);
+    distance2 = squared_distance(photon.position, receiver.position);
     return distance2 <= receiver.radius2 &&
-           floatBitsToUint(photon.position_object.w) == receiver.object &&
+           photon.object == receiver.object &&
            cosine < 0.0;
 }
 
@@ -70,10 +70,10 @@ const Sum NOTHING = Sum(vec3(0.0), 0u, 0.0);
 void gather(Receiver receiver, Photon photon, inout Sum sum) {
     float distance2;
     bool accepted = accepts(receiver, photon, distance2);
-    vec3 flux = photon.flux_direction.rgb;
+    vec3 flux = photon.flux;
     if (carries_bsdf()) {
         // The sum is the light that the surface scatters to the viewer.
-        flux *= accepted ? gathered_part(receiver.bsdf, floatBitsToUint(photon.flux_direction.w)) : vec3(0.0);
+        flux *= accepted ? gathered_part(receiver.bsdf, photon.direction) : vec3(0.0);
     }
     sum.flux += accepted ? flux : vec3(0.0);
     sum.count += accepted ? 1u : 0u;

@@ -1,9 +1,9 @@
 #include "layout.glsl"
 
-uint object_of(vec4 position_object) {
-    return floatBitsToUint(position_object.w) & ~CAUSTIC;
+uint object_of(Photon photon) {
+    return photon.object & ~CAUSTIC;
 }
 
-uint map_of(vec4 position_object) {
-    return floatBitsToUint(position_object.w) >> 31u;
+uint map_of(Photon photon) {
+    return photon.object >> 31u;
 }

@@ -1,4 +1,9 @@
-// The order of visible points. Include after settings.glsl.
+// Visible points and their order. Include after settings.glsl.
+
+// In place of a visible point, of a path without one.
+VisiblePoint no_visible_point(vec3 emitted, bool met_surface) {
+    return VisiblePoint(vec3(0.0), NO_OBJECT, vec3(0.0), met_surface ? 1u : 0u, emitted, 0u);
+}
 
 // Visible points are stored in 8×8 tiles of pixels, 4×2 inside a tile: neighbours in the picture are neighbours in memory. At the
 // picture's edge, slots are unused.

@@ -6,7 +6,6 @@ layout(local_size_x = 64) in;
 
 #include "common/invocation.glsl"
 #include "settings.glsl"
-#include "common/texel.glsl"
 #include "gather/visible_point.glsl"
 #include "ladder/clusters.glsl"
 
@@ -23,14 +22,14 @@ void main() {
     uint slot = mesh_order[place];
     uint nearest = NO_SLOT;
     if (slot != NO_SLOT) {
-        vec4 point = VISIBLE_POINT(VisiblePoints, slot).position_object;
+        VisiblePoint point = VISIBLE_POINT(VisiblePoints, slot);
         float least = 1e30;
         uvec2 window = window_of(place / GROUP);
         for (uint run = window.x; run < window.y; run++) {
-            vec4 centre = TEXEL(Centroids, run);
-            vec3 d = centre.xyz - point.xyz;
+            Centroid cluster = CENTROID(Centroids, run);
+            vec3 d = cluster.position - point.position;
             float d2 = dot(d, d);
-            if (floatBitsToUint(centre.w) == floatBitsToUint(point.w) && d2 < least) {
+            if (cluster.object == point.object && d2 < least) {
                 least = d2;
                 nearest = run;
             }

@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer MeshOrder { uint mesh_order[]; };
 layout(std430) readonly buffer ClusterOf { uint cluster_of[]; };
-layout(std430) buffer Centroids { vec4 centroids[]; };
+layout(std430) buffer Centroids { Centroid centroids[]; };
 layout(std430) writeonly buffer ClusterSizes { uint cluster_sizes[]; };
 layout(std430) writeonly buffer ClusterStarts { uint padded_sizes[]; };
 
@@ -21,17 +21,17 @@ void main() {
     if (cluster >= push.runs) {
         return;
     }
-    vec4 before = centroids[cluster];
+    Centroid before = centroids[cluster];
     vec3 offset = vec3(0.0);
     uint count = 0u;
     uvec2 window = window_of(cluster);
     for (uint place = window.x * GROUP; place < window.y * GROUP; place++) {
         if (cluster_of[place] == cluster) {
-            offset += VISIBLE_POINT(VisiblePoints, mesh_order[place]).position_object.xyz - before.xyz;
+            offset += VISIBLE_POINT(VisiblePoints, mesh_order[place]).position - before.position;
             count += 1u;
         }
     }
-    centroids[cluster] = vec4(before.xyz + offset / float(max(count, 1u)), before.w);
+    centroids[cluster] = Centroid(before.position + offset / float(max(count, 1u)), before.object);
     cluster_sizes[cluster] = count;
     // Including fillers, so that no workgroup has points of two clusters.
     padded_sizes[cluster] = (count + GROUP - 1u) / GROUP * GROUP;

@@ -48,7 +48,7 @@ uvec2 photons_to_test(uint object) {
 
 void test(Receiver receiver, float radius, Photon photon, inout Sum sum) {
     // The rounding of the built-in is unspecified; the margin leaves the decision to the common predicate.
-    bool far = DISTANCE ? distance(photon.position_object.xyz, receiver.position) > radius * 1.00001 : false;
+    bool far = DISTANCE ? distance(photon.position, receiver.position) > radius * 1.00001 : false;
     if (!far) {
         gather(receiver, photon, sum);
     }

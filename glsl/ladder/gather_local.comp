@@ -39,7 +39,7 @@ void main() {
     uint object = 0u;
     if (BY_MESH) {
         uint first_slot = slot_at(0u);
-        object = first_slot == NO_SLOT ? NO_OBJECT : floatBitsToUint(VISIBLE_POINT(VisiblePoints, first_slot).position_object.w);
+        object = first_slot == NO_SLOT ? NO_OBJECT : VISIBLE_POINT(VisiblePoints, first_slot).object;
     }
     uvec2 range = receivers > 0u ? photons_to_test(object) : uvec2(0u);
     float radius = sqrt(max(receiver.radius2, 0.0));

@@ -14,6 +14,6 @@ layout(std430) buffer MeshEnds { uint mesh_ends[]; }; // cleared before
 void main() {
     uint i = invocation_index();
     if (i < photon_count) {
-        atomicAdd(mesh_ends[object_of(PHOTON(Photons, i).position_object)], 1u);
+        atomicAdd(mesh_ends[object_of(PHOTON(Photons, i))], 1u);
     }
 }

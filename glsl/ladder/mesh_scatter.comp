@@ -17,6 +17,6 @@ void main() {
     uint i = invocation_index();
     if (i < photon_count) {
         Photon photon = PHOTON(Photons, i);
-        sorted_photons[atomicAdd(mesh_ends[object_of(photon.position_object)], 1u)] = photon;
+        sorted_photons[atomicAdd(mesh_ends[object_of(photon)], 1u)] = photon;
     }
 }

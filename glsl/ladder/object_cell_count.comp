@@ -15,8 +15,8 @@ layout(std430) buffer ObjectCells { uint cell_photons[]; }; // cleared before
 void main() {
     uint i = invocation_index();
     if (i < photon_count) {
-        vec4 position_object = PHOTON(Photons, i).position_object;
-        ObjectGrid grid = object_grid(object_of(position_object));
-        atomicAdd(cell_photons[cell_number(grid, cell_in(grid, position_object.xyz))], 1u);
+        Photon photon = PHOTON(Photons, i);
+        ObjectGrid grid = object_grid(object_of(photon));
+        atomicAdd(cell_photons[cell_number(grid, cell_in(grid, photon.position))], 1u);
     }
 }

@@ -21,8 +21,8 @@ void main() {
         return;
     }
     Photon photon = PHOTON(Photons, i);
-    ObjectGrid grid = object_grid(object_of(photon.position_object));
-    uint cell = cell_number(grid, cell_in(grid, photon.position_object.xyz));
+    ObjectGrid grid = object_grid(object_of(photon));
+    uint cell = cell_number(grid, cell_in(grid, photon.position));
     uint place = cell_starts[cell] + atomicAdd(cursors[cell], 1u);
     // The cell is full.
     if (place < cell_starts[cell + 1u]) {

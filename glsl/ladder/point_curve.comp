@@ -31,13 +31,13 @@ void main() {
     if (slot == 0u) {
         point_count = slots();
     }
-    vec4 position_object = VISIBLE_POINT(VisiblePoints, slot).position_object;
-    uint object = floatBitsToUint(position_object.w);
+    VisiblePoint point = VISIBLE_POINT(VisiblePoints, slot);
+    uint object = point.object;
     uint key = 0u;
     if (object != NO_OBJECT) {
         ObjectGrid grid = object_grid(object);
         float pieces = float(max(grid.cells.x, max(grid.cells.y, grid.cells.z)));
-        vec3 along = (position_object.xyz - grid.low) * (grid.inverse_cell * float(1u << BITS) / pieces);
+        vec3 along = (point.position - grid.low) * (grid.inverse_cell * float(1u << BITS) / pieces);
         uvec3 cell = uvec3(clamp(along, vec3(0.0), vec3(float((1u << BITS) - 1u))));
         key = spread(cell.x) | spread(cell.y) << 1u | spread(cell.z) << 2u;
     }

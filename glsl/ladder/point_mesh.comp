@@ -30,7 +30,7 @@ void main() {
         point_count = slots();
     }
     uint slot = PRESORTED ? values[i] : i;
-    uint object = floatBitsToUint(VISIBLE_POINT(VisiblePoints, slot).position_object.w);
+    uint object = VISIBLE_POINT(VisiblePoints, slot).object;
     // Slots without a visible point come last.
     keys[i] = min(object, push.meshes);
     values[i] = slot;

@@ -257,12 +257,11 @@ void main() {
                             STORE_BSDF(packed_bsdfs, slot, bsdf, -incoming, has_coat(met.surface.material));
                         }
                         found = true;
-                        visible_points[slot].position_object =
-                            vec4(met.surface.position, uintBitsToFloat(met.surface.object));
-                        visible_points[slot].weight_normal =
-                            vec4(branch.throughput * weight_of(bsdf),
-                                 uintBitsToFloat(encode_direction(met.frame.geometric_normal)));
-                        visible_points[slot].emitted_normal.w = uintBitsToFloat(encode_direction(met.frame.shading_normal));
+                        visible_points[slot].position = met.surface.position;
+                        visible_points[slot].object = met.surface.object;
+                        visible_points[slot].weight = branch.throughput * weight_of(bsdf);
+                        visible_points[slot].geometric_normal = encode_direction(met.frame.geometric_normal);
+                        visible_points[slot].shading_normal = encode_direction(met.frame.shading_normal);
                     }
                 }
                 branch.origin = origin_towards(met.surface, branch.direction);
@@ -270,11 +269,9 @@ void main() {
         }
         if (ended && !contributes(light_ray)) {
             if (found) {
-                visible_points[slot].emitted_normal.rgb = branch.emitted;
+                visible_points[slot].emitted = branch.emitted;
             } else {
-                visible_points[slot] = VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)),
-                                                    vec4(0.0, 0.0, 0.0, uintBitsToFloat(met_surface ? 1u : 0u)),
-                                                    vec4(branch.emitted, 0.0));
+                visible_points[slot] = no_visible_point(branch.emitted, met_surface);
             }
             footprints[slot] = settings.pixel_spread * (parallel ? 1.0 : branch.way);
             used += 1u;
@@ -291,7 +288,6 @@ void main() {
         atomicAdd(status.cut_paths, 1u);
     }
     for (; used < SLOTS; used++) {
-        visible_points[pixel_slot * SLOTS + used] =
-            VisiblePoint(vec4(0.0, 0.0, 0.0, uintBitsToFloat(NO_OBJECT)), vec4(0.0), vec4(0.0));
+        visible_points[pixel_slot * SLOTS + used] = no_visible_point(vec3(0.0), false);
     }
 }

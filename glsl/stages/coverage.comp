@@ -50,9 +50,9 @@ bool leaves(vec3 origin, vec3 direction, PlacedTriangle ignored, Side entered) {
 }
 
 bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
-    uint object = floatBitsToUint(visible_point.position_object.w);
-    vec3 n = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
-    vec3 origin = offset_origin(visible_point.position_object.xyz, n, reach_of(object));
+    uint object = visible_point.object;
+    vec3 n = decode_direction(visible_point.geometric_normal);
+    vec3 origin = offset_origin(visible_point.position, n, reach_of(object));
     vec3 along = basis(n) * vec3(radius * disc_point(u), 0.0);
     // Along the surface, into other objects and out of them again.
     bool inside = false;
@@ -101,8 +101,8 @@ bool can_have_photons(VisiblePoint visible_point, float radius, vec2 u) {
 
 // Whether a ray hits a surface behind glass that may scatter or reflect light.
 bool is_surrounded(VisiblePoint visible_point, vec2 u) {
-    vec3 n = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
-    vec3 origin = offset_origin(visible_point.position_object.xyz, n, reach_of(floatBitsToUint(visible_point.position_object.w)));
+    vec3 n = decode_direction(visible_point.geometric_normal);
+    vec3 origin = offset_origin(visible_point.position, n, reach_of(visible_point.object));
     vec3 direction = cosine_direction(n, u);
     PlacedTriangle ignored = NO_TRIANGLE;
     bool scatters = false;
@@ -143,7 +143,7 @@ void main() {
     }
     uint slot = receiver % slots();
     VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
-    if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
+    if (visible_point.object == NO_OBJECT) {
         return;
     }
     // Without photons nothing needs a correction.

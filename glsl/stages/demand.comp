@@ -49,8 +49,8 @@ void main() {
         return;
     }
     uint slot = i % slots();
-    vec4 position_object = VISIBLE_POINT(VisiblePoints, slot).position_object;
-    uint object = floatBitsToUint(position_object.w);
+    VisiblePoint point = VISIBLE_POINT(VisiblePoints, slot);
+    uint object = point.object;
     float radius2 = radii2[i];
     if (object == NO_OBJECT) {
         return;
@@ -58,17 +58,17 @@ void main() {
     float radius = sqrt(radius2);
     float footprint = max(footprints[slot], 1e-3 * radius);
     float radiance = radiance_of(slot);
-    float of_one = mean_of(VISIBLE_POINT(VisiblePoints, slot).weight_normal.rgb) / (PI * radius2);
+    float of_one = mean_of(VISIBLE_POINT(VisiblePoints, slot).weight) / (PI * radius2);
     float reached = PI * radius2 / (footprint * footprint);
     uint wanted = floatBitsToUint(clamp(of_one * of_one * reached / (radiance * radiance + settings.demand_floor2), 1e-30, 1e30));
 
     float reach = radius * 1.000001 + 1e-7;
-    uvec2 shells = shells_of(position_object.xyz, radius);
+    uvec2 shells = shells_of(point.position, radius);
     for (uint shell = shells.x; shell <= shells.y; shell++) {
         uint of_shell = i / slots() * SHELLS + shell;
         float inverse = grid.inverse_cell_size[of_shell] * (1.0 / COARSENING);
-        ivec3 low = cell_of(position_object.xyz - reach, inverse);
-        ivec3 high = cell_of(position_object.xyz + reach, inverse);
+        ivec3 low = cell_of(point.position - reach, inverse);
+        ivec3 high = cell_of(point.position + reach, inverse);
         for (int z = low.z; z <= high.z; z++) {
             for (int y = low.y; y <= high.y; y++) {
                 for (int x = low.x; x <= high.x; x++) {

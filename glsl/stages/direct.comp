@@ -67,10 +67,10 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     // Choosing among many lights needs more digits.
     vec4 digits = settings.light_count > 1u ? next4(random) : vec4(0.0);
 
-    vec3 position = visible_point.position_object.xyz;
-    vec3 geometric_normal = decode_direction(floatBitsToUint(visible_point.weight_normal.w));
-    vec3 shading_normal = decode_direction(floatBitsToUint(visible_point.emitted_normal.w));
-    vec3 origin = offset_origin(position, geometric_normal, reach_of(floatBitsToUint(visible_point.position_object.w)));
+    vec3 position = visible_point.position;
+    vec3 geometric_normal = decode_direction(visible_point.geometric_normal);
+    vec3 shading_normal = decode_direction(visible_point.shading_normal);
+    vec3 origin = offset_origin(position, geometric_normal, reach_of(visible_point.object));
     LightReceiver receiver = LightReceiver(position, shading_normal, origin, of_source);
     float bsdf_sampling = is_near_light(position) ? settings.bsdf_sampling : 0.0;
     if (has_narrow_lobe(bsdf_of_slot(slot, shading_normal)) && settings.near_light_count > 0u) {
@@ -90,7 +90,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     VisibleBsdf bsdf = bsdf_of_slot(slot, shading_normal);
     float of_bsdf = bsdf_sampling * bsdf_density(bsdf, sampled.towards);
     float by_light = 1.0 - bsdf_sampling;
-    vec3 weight = visible_point.weight_normal.rgb * cos_surface * evaluate_bsdf(bsdf, sampled.towards);
+    vec3 weight = visible_point.weight * cos_surface * evaluate_bsdf(bsdf, sampled.towards);
     vec3 brings = leaves ? weight * sampled.radiance : vec3(0.0);
     if (!by_bsdf) {
         brings /= by_light * sampled.density + (sampled.delta ? 0.0 : of_bsdf);
@@ -149,10 +149,10 @@ void main() {
         return;
     }
     VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
-    bool has_object = floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
-    bool met = has_object || floatBitsToUint(visible_point.weight_normal.w) != 0u;
+    bool has_object = visible_point.object != NO_OBJECT;
+    bool met = has_object || visible_point.geometric_normal != 0u;
     coverage[slot].met += met ? 1u : 0u;
-    vec3 radiance = visible_point.emitted_normal.rgb;
+    vec3 radiance = visible_point.emitted;
     float unbent = 0.0;
     bool asks = false;
     if (SAMPLE_LIGHTS && has_object) {

@@ -124,11 +124,11 @@ void main() {
                 to_test += max(end, i) - i;
                 do {
                     Photon photon = PHOTON(SortedPhotons, i);
-                    vec3 position = photon.position_object.xyz;
+                    vec3 position = photon.position;
                     // Rows that share a bucket must be counted once.
                     bool here = i < end && row_of(cell_of(position, inverse)) == row && shell_of(position) == shell;
                     // No receiver lies on that object.
-                    photon.position_object.w = here ? photon.position_object.w : uintBitsToFloat(NO_OBJECT - 1u);
+                    photon.object = here ? photon.object : NO_OBJECT - 1u;
                     for (uint k = 0u; k < RUN; k++) {
                         gather(cluster[k], photon, sums[k]);
                     }

@@ -21,9 +21,9 @@ void main() {
     if (i >= photon_count) {
         return;
     }
-    vec4 position_object = PHOTON(Photons, i).position_object;
-    uint of_shell = map_of(position_object) * SHELLS + shell_of(position_object.xyz);
-    uint bucket = bucket_of(cell_of(position_object.xyz, grid.inverse_cell_size[of_shell]), of_shell);
+    Photon photon = PHOTON(Photons, i);
+    uint of_shell = map_of(photon) * SHELLS + shell_of(photon.position);
+    uint bucket = bucket_of(cell_of(photon.position, grid.inverse_cell_size[of_shell]), of_shell);
     keys[i] = bucket;
     values[i] = i;
     atomicAdd(cell_photons[bucket], 1u);

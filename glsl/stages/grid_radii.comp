@@ -24,20 +24,20 @@ void main() {
     if (i >= receiver_count()) {
         return;
     }
-    vec4 position_object = VISIBLE_POINT(VisiblePoints, i % slots()).position_object;
-    if (floatBitsToUint(position_object.w) == NO_OBJECT) {
+    VisiblePoint point = VISIBLE_POINT(VisiblePoints, i % slots());
+    if (point.object == NO_OBJECT) {
         return;
     }
     float radius2 = TEXEL(Radii2, i >> 2u)[i & 3u];
     uint first_shell = i / slots() * SHELLS;
-    uvec2 shells = shells_of(position_object.xyz, sqrt(radius2));
+    uvec2 shells = shells_of(point.position, sqrt(radius2));
     for (uint shell = first_shell + shells.x; shell <= first_shell + shells.y; shell++) {
         if (floatBitsToUint(radius2) > radii_of_shells[shell].largest) {
             atomicMax(radii_of_shells[shell].largest, floatBitsToUint(radius2));
         }
     }
     if (i % push.step == 0u) {
-        uint shell = first_shell + shell_of(position_object.xyz);
+        uint shell = first_shell + shell_of(point.position);
         atomicAdd(radii_of_shells[shell].logs, radius_log(radius2));
         atomicAdd(radii_of_shells[shell].count, 1u);
     }

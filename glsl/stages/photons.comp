@@ -158,8 +158,8 @@ void main() {
                                 // A partly transparent surface is seen in part as well as hit in part.
                                 vec3 flux_there = path.flux * kept_factor(met, incoming) / met.opacity;
                                 lane_photons[stored * settings.photon_lanes + lane] =
-                                    Photon(vec4(met.surface.position, uintBitsToFloat(met.surface.object | map << 31u)),
-                                           vec4(flux_there, uintBitsToFloat(encode_direction(incoming))));
+                                    Photon(met.surface.position, met.surface.object | map << 31u,
+                                           flux_there, encode_direction(incoming));
                             }
                             stored += 1u;
                         }

@@ -24,7 +24,7 @@ void main() {
     uint slot = i % slots();
     uint map = i / slots();
     float radius2 = statistics[i].radius2_high;
-    if (floatBitsToUint(VISIBLE_POINT(VisiblePoints, slot).position_object.w) != NO_OBJECT) {
+    if (VISIBLE_POINT(VisiblePoints, slot).object != NO_OBJECT) {
         float footprint = footprints[slot];
         if (radius2 == 0.0) {
             float first = settings.first_footprints[map] * footprint;

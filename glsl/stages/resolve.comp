@@ -63,7 +63,7 @@ void main() {
         met = max(met, coverage[slot].met);
         VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
         bool lies_behind_glass =
-            sum.high.w > 0.0 && floatBitsToUint(visible_point.position_object.w) != NO_OBJECT;
+            sum.high.w > 0.0 && visible_point.object != NO_OBJECT;
         for (uint map = 0u; map < settings.photon_maps; map++) {
             uint receiver = map * slots() + slot;
             Statistics mine = statistics[receiver];
@@ -79,7 +79,7 @@ void main() {
             if (lies_behind_glass && through_glass) {
                 // Of several slots, the one with the most photons.
                 glass.photons = max(glass.photons, float(photons_of(mine.accepted_low, mine.accepted_high)));
-                float radius = sqrt(mine.radius2_high) / pixel_width(visible_point.position_object.xyz);
+                float radius = sqrt(mine.radius2_high) / pixel_width(visible_point.position);
                 glass.radius = max(glass.radius, radius);
                 glass.radius2 = max(glass.radius2, mine.radius2_high);
             }

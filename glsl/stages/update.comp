@@ -50,12 +50,12 @@ void main() {
         return;
     }
     VisiblePoint visible_point = VISIBLE_POINT(VisiblePoints, slot);
-    if (floatBitsToUint(visible_point.position_object.w) == NO_OBJECT) {
+    if (visible_point.object == NO_OBJECT) {
         return;
     }
     vec4 radiance = vec4(0.0);
     for (uint map = 0u; map < settings.photon_maps; map++) {
-        radiance += update_map(map * slots() + slot, visible_point.weight_normal.rgb);
+        radiance += update_map(map * slots() + slot, visible_point.weight);
     }
     if (radiance != vec4(0.0)) {
         sequence_sums[slot] += radiance;

@@ -261,9 +261,9 @@ Hit trace_all(Ray ray, Progress progress, float limit, PlacedTriangle ignored, b
         bool tests = left > 0u;
         if (tests) {
             ShadingTriangle triangle = shading_triangle(at.triangle);
-            vec3 corner0 = triangle.p0.xyz;
-            vec3 corner1 = triangle.p1.xyz;
-            vec3 corner2 = triangle.p2.xyz;
+            vec3 corner0 = triangle.p0;
+            vec3 corner1 = triangle.p1;
+            vec3 corner2 = triangle.p2;
             if (INSTANCED) {
                 corner0 = placed(rows, corner0);
                 corner1 = placed(rows, corner1);

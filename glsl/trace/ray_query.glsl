@@ -24,9 +24,9 @@ Hit trace_by_query(Ray ray, Progress progress, float limit, PlacedTriangle ignor
             at.triangle += placement.first_triangle;
         }
         ShadingTriangle triangle = shading_triangle(at.triangle);
-        vec3 corner0 = triangle.p0.xyz;
-        vec3 corner1 = triangle.p1.xyz;
-        vec3 corner2 = triangle.p2.xyz;
+        vec3 corner0 = triangle.p0;
+        vec3 corner1 = triangle.p1;
+        vec3 corner2 = triangle.p2;
         LocalRay local = in_render_space(ray);
         if (is_placed) {
             corner0 = placed(rows, corner0);

@@ -102,9 +102,9 @@ mat3 normal_rows(Instance instance) {
 vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_normal, uint instance) {
     vec3 normal = geometric_normal;
     if ((triangle.flags & SMOOTH_SHADED) != 0u) {
-        vec3 n0 = decode_direction(floatBitsToUint(triangle.p0.w));
-        vec3 n1 = decode_direction(floatBitsToUint(triangle.p1.w));
-        vec3 n2 = decode_direction(floatBitsToUint(triangle.p2.w));
+        vec3 n0 = decode_direction(triangle.n0);
+        vec3 n1 = decode_direction(triangle.n1);
+        vec3 n2 = decode_direction(triangle.n2);
         if (is_placed(instance)) {
             mat3 rows = normal_rows(instance_at(instance));
             n0 = normalize(n0 * rows);
@@ -122,9 +122,9 @@ vec3 interpolated_normal(ShadingTriangle triangle, vec2 uv, vec3 geometric_norma
 // The position is computed from the barycentric coordinates: unlike that of origin + t·direction, its error does not grow with t.
 Surface surface_at(Hit hit) {
     ShadingTriangle triangle = shading_triangle(hit.triangle);
-    vec3 p0 = triangle.p0.xyz;
-    vec3 p1 = triangle.p1.xyz;
-    vec3 p2 = triangle.p2.xyz;
+    vec3 p0 = triangle.p0;
+    vec3 p1 = triangle.p1;
+    vec3 p2 = triangle.p2;
     vec3 reach = max(max(abs(p0), abs(p1)), abs(p2));
     float side = 1.0;
     if (is_placed(hit.instance)) {

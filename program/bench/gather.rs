@@ -267,7 +267,7 @@ fn input(renderer: &mut Renderer) -> Result<Input> {
 }
 
 fn object(point: &VisiblePoint) -> u32 {
-    point.position_object[3].to_bits()
+    point.object
 }
 
 fn count_of(gathered: &Gathered) -> u32 {

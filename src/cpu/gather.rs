@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::reflector::Reflector;
 use super::sampling::decode_direction;
-use super::vector::{mean, word, xyz};
+use super::vector::{mean, xyz};
 use crate::kd_tree::KdTree;
 use crate::layout::{CAUSTIC, NO_OBJECT, PackedBsdf, Photon, VisiblePoint};
 
@@ -59,7 +59,7 @@ impl Receiver {
         let here = position(photon);
         let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| here[axis] - self.position[axis]);
         let distance2 = x * x + y * y + z * z;
-        let is_within = distance2 <= self.radius2 && word(photon.position_object) == self.object;
+        let is_within = distance2 <= self.radius2 && photon.object == self.object;
         (is_within && arriving.dot(self.normal) < 0.0).then_some(distance2)
     }
 }
@@ -93,13 +93,12 @@ impl Receivers for DeviceReceivers<'_> {
     fn receiver(&self, index: usize) -> Option<Receiver> {
         let (map, slot) = (index / self.points.len(), index % self.points.len());
         let point = &self.points[slot];
-        let object = word(point.position_object);
-        let [x, y, z, _] = point.position_object;
+        let object = point.object;
         (object != NO_OBJECT).then(|| Receiver {
-            position: [x, y, z],
+            position: point.position,
             radius2: self.radii2[index],
             object: if map == 1 { object | CAUSTIC } else { object },
-            normal: decode_direction(word(point.weight_normal)),
+            normal: decode_direction(point.geometric_normal),
         })
     }
 
@@ -107,7 +106,7 @@ impl Receivers for DeviceReceivers<'_> {
         let slot = index % self.points.len();
         self.bsdfs.get(slot).map_or(DVec3::ONE, |packed| {
             let (reflector, viewer, coated) = Reflector::of_packed(packed);
-            let normal = decode_direction(word(self.points[slot].emitted_normal));
+            let normal = decode_direction(self.points[slot].shading_normal);
             // Flux on coated objects is per area across the ray, because each layer has its own normal.
             let cosine = if coated { l.dot(normal).max(0.0) } else { 1.0 };
             reflector.brdf(normal, viewer, l) * cosine
@@ -116,8 +115,7 @@ impl Receivers for DeviceReceivers<'_> {
 }
 
 fn position(photon: &Photon) -> [f32; 3] {
-    let [x, y, z, _] = photon.position_object;
-    [x, y, z]
+    photon.position
 }
 
 /// Sums the photons that `find` returns for each receiver.
@@ -131,9 +129,9 @@ fn gather<R: Receivers>(
         if let Some(receiver) = receivers.receiver(index) {
             find(&receiver, &mut |found| {
                 let photon = &photons[found];
-                let arriving = decode_direction(word(photon.flux_direction));
+                let arriving = decode_direction(photon.direction);
                 if let Some(distance2) = receiver.accepts(photon, arriving) {
-                    let flux = xyz(photon.flux_direction) * receivers.response(index, -arriving);
+                    let flux = xyz(photon.flux) * receivers.response(index, -arriving);
                     gathered.flux += flux;
                     gathered.count += 1;
                     gathered.moment += mean(flux) * f64::from(distance2);

@@ -9,7 +9,6 @@ use super::lights::{Emission, choose_by_power, range_window, sample_emission};
 use super::media::{Media, transmittance};
 use super::sampling::encode_direction;
 use super::texture::nearest_visible;
-use super::vector::with_word;
 use super::{FAR, Inputs};
 use crate::config::Direct;
 use crate::layout::Photon;
@@ -78,8 +77,10 @@ pub fn trace_photon_path(inputs: &Inputs<'_>, path: u32, iteration: u32, photons
                 return Ending::NonFinite;
             }
             photons.push(Photon {
-                position_object: with_word(met.surface.position, met.surface.object),
-                flux_direction: with_word(landing, encode_direction(incoming)),
+                position: met.surface.position.as_vec3().into(),
+                object: met.surface.object,
+                flux: landing.as_vec3().into(),
+                direction: encode_direction(incoming),
             });
         }
         let [place, turn, choice, survival] = random.next4();

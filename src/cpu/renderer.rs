@@ -15,7 +15,7 @@ use super::gather::{Gathered, gather_kd_tree, gather_naive};
 use super::photons::{Ending, trace_photon_path};
 use super::slots::{Discs, Pixel, Slot};
 use super::statistics::Statistics;
-use super::vector::{mean, with_word};
+use super::vector::mean;
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
 use crate::config::{Direct, Estimator, RenderConfig, SEQUENCES, Totals, iterations_of};
 use crate::error::{Error, Result, Setting};
@@ -158,8 +158,11 @@ impl Renderer {
             self.photon_flux = radius::mean_flux(&photons);
             let seen = self.paths.iter().flat_map(|path| &path.points);
             let as_on_device = seen.map(|point| {
-                let mut packed = layout::VisiblePoint::zeroed();
-                packed.position_object = with_word(point.surface.position, point.surface.object);
+                let packed = layout::VisiblePoint {
+                    position: point.surface.position.as_vec3().into(),
+                    object: point.surface.object,
+                    ..layout::VisiblePoint::zeroed()
+                };
                 (packed, point.footprint as f32)
             });
             let (points, footprints): (Vec<_>, Vec<_>) = as_on_device.unzip();

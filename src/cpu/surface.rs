@@ -4,7 +4,6 @@ use glam::{DMat3, DVec3};
 
 use super::intersect::{Hit, PlacedTriangle};
 use super::sampling::decode_direction;
-use super::vector::word;
 use crate::layout::{Material, RANK, ROUNDINGS, SMOOTH_SHADED, ShadingTriangle};
 use crate::packing::PackedScene;
 
@@ -98,8 +97,8 @@ fn interpolated_normal(
     if triangle.flags & SMOOTH_SHADED == 0 {
         return geometric_normal;
     }
-    let [n0, n1, n2] = [triangle.p0, triangle.p1, triangle.p2].map(|corner| {
-        let normal = decode_direction(word(corner));
+    let [n0, n1, n2] = [triangle.n0, triangle.n1, triangle.n2].map(|normal| {
+        let normal = decode_direction(normal);
         normal_matrix.map_or(normal, |matrix| (matrix * normal).normalize())
     });
     let n = (1.0 - u - v) * n0 + u * n1 + v * n2;

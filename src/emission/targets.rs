@@ -88,7 +88,7 @@ fn shared_triangles(scene: &PackedScene, first: u32, count: u32) -> impl Iterato
 }
 
 pub(super) fn corners_of(triangle: &ShadingTriangle) -> [DVec3; 3] {
-    [triangle.p0, triangle.p1, triangle.p2].map(|[x, y, z, _]| Vec3::new(x, y, z).as_dvec3())
+    [triangle.p0, triangle.p1, triangle.p2].map(|corner| Vec3::from(corner).as_dvec3())
 }
 
 /// Whether camera paths follow its reflection or refraction.
@@ -160,15 +160,8 @@ fn clustered(mut spheres: Vec<Sphere>) -> Vec<Sphere> {
 
 /// Spheres around the centre of the view, until one would contain the whole scene.
 fn nested(points: &[VisiblePoint], whole: &Sphere) -> Vec<Sphere> {
-    let seen = points
-        .iter()
-        .filter(|point| point.position_object[3].to_bits() != NO_OBJECT);
-    let positions: Vec<DVec3> = seen
-        .map(|point| {
-            let [x, y, z, _] = point.position_object;
-            Vec3::new(x, y, z).as_dvec3()
-        })
-        .collect();
+    let seen = points.iter().filter(|point| point.object != NO_OBJECT);
+    let positions: Vec<DVec3> = seen.map(|point| Vec3::from(point.position).as_dvec3()).collect();
     if positions.is_empty() {
         return Vec::new();
     }
@@ -193,6 +186,7 @@ fn nested(points: &[VisiblePoint], whole: &Sphere) -> Vec<Sphere> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bytemuck::Zeroable;
 
     fn ball(x: f64, y: f64, radius: f64) -> Sphere {
         Sphere {
@@ -238,9 +232,8 @@ mod tests {
     #[test]
     fn spheres_around_what_is_seen_grow_up_to_the_scene() {
         let point = |i: i32| VisiblePoint {
-            position_object: [0.5 + 1e-4 * i as f32, 0.0, 0.0, f32::from_bits(0)],
-            weight_normal: [0.0; 4],
-            emitted_normal: [0.0; 4],
+            position: [0.5 + 1e-4 * i as f32, 0.0, 0.0],
+            ..VisiblePoint::zeroed()
         };
         let whole = ball(0.0, 0.0, 1.2);
         let found = nested(&(-50..=50).map(point).collect::<Vec<_>>(), &whole);

@@ -74,13 +74,18 @@ device_structs! {
 
     /// The paper's hitpoint.
     pub struct VisiblePoint: 48 {
-        /// xyz: position; w: u32 bits, object or [`NO_OBJECT`].
-        pub position_object: [f32; 4],
-        /// rgb: throughput × BRDF, 1/sr; w: u32 bits, octahedral geometric normal on the viewer's side, or without an object 1
-        /// where the path met a surface.
-        pub weight_normal: [f32; 4],
-        /// rgb: radiance that the path saw by itself; w: u32 bits, octahedral shading normal on the viewer's side.
-        pub emitted_normal: [f32; 4],
+        /// Position.
+        pub position: [f32; 3],
+        /// Index of the object, or [`NO_OBJECT`].
+        pub object: u32,
+        /// Throughput × BRDF, 1/sr.
+        pub weight: [f32; 3],
+        /// Octahedral geometric normal on the viewer's side. Without an object: 1 if the path hit a surface, else 0.
+        pub geometric_normal: u32,
+        /// Emission along the path, radiance.
+        pub emitted: [f32; 3],
+        /// Octahedral shading normal on the viewer's side.
+        pub shading_normal: u32,
     }
 
     /// Where a photon path starts.
@@ -101,11 +106,22 @@ device_structs! {
 
     /// A photon.
     pub struct Photon: 32 {
-        /// xyz: position; w: u32 bits, object and [`CAUSTIC`].
-        pub position_object: [f32; 4],
-        /// rgb: flux, not divided by the emitted paths, and on coated materials over the cosine to the geometric normal; w: u32
-        /// bits, octahedral direction of flight.
-        pub flux_direction: [f32; 4],
+        /// Position.
+        pub position: [f32; 3],
+        /// Index of the object, and [`CAUSTIC`].
+        pub object: u32,
+        /// Flux, not divided by the number of emitted paths; on coated materials divided by the cosine to the geometric normal.
+        pub flux: [f32; 3],
+        /// Octahedral direction of propagation.
+        pub direction: u32,
+    }
+
+    /// The centre of a cluster of visible points.
+    pub struct Centroid: 16 {
+        /// Mean position.
+        pub position: [f32; 3],
+        /// Index of the object, or [`NO_OBJECT`] for an empty cluster.
+        pub object: u32,
     }
 
     /// R², N and τ of a visible point.

@@ -50,12 +50,18 @@ device_structs! {
 
     /// A triangle as shading needs it.
     pub struct ShadingTriangle: 64 {
-        /// xyz: position; w: u32 bits, octahedral shading normal.
-        pub p0: [f32; 4],
-        /// Likewise.
-        pub p1: [f32; 4],
-        /// Likewise.
-        pub p2: [f32; 4],
+        /// Position of the first corner.
+        pub p0: [f32; 3],
+        /// Octahedral shading normal there.
+        pub n0: u32,
+        /// Of the second corner.
+        pub p1: [f32; 3],
+        /// Of the second corner.
+        pub n1: u32,
+        /// Of the third corner.
+        pub p2: [f32; 3],
+        /// Of the third corner.
+        pub n2: u32,
         /// Index of its object; what instances share has none.
         pub object: u32,
         /// Index of its material.

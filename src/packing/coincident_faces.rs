@@ -138,7 +138,7 @@ struct Face {
 
 impl Face {
     fn new(triangle: &ShadingTriangle, place: Option<&Place>) -> Self {
-        let corners = [triangle.p0, triangle.p1, triangle.p2].map(|[x, y, z, _]| Vec3::new(x, y, z));
+        let corners = [triangle.p0, triangle.p1, triangle.p2].map(Vec3::from);
         Self::of_corners(corners, triangle.object, place)
     }
 

@@ -310,10 +310,6 @@ fn shading_triangle(scene: &Scene, index: u32, material_index: u32, corners: &[V
     let smooth_shaded = normals
         .iter()
         .any(|normal| normal.as_dvec3().dot(geometric.as_dvec3()) < flat);
-    let vertex = |i: usize| {
-        let p = corners[i];
-        [p.x, p.y, p.z, f32::from_bits(encode_direction(normals[i]))]
-    };
     let material = &scene.materials[material_index as usize];
     let colored = triangle.vertices.iter().any(|&vertex| {
         let color = scene.colors.get(vertex as usize);
@@ -321,9 +317,12 @@ fn shading_triangle(scene: &Scene, index: u32, material_index: u32, corners: &[V
     });
     let textured = colored || material.needs_corners();
     ShadingTriangle {
-        p0: vertex(0),
-        p1: vertex(1),
-        p2: vertex(2),
+        p0: corners[0].into(),
+        n0: encode_direction(normals[0]),
+        p1: corners[1].into(),
+        n1: encode_direction(normals[1]),
+        p2: corners[2].into(),
+        n2: encode_direction(normals[2]),
         object: triangle.object,
         material: material_index,
         flags: if smooth_shaded { SMOOTH_SHADED } else { 0 }

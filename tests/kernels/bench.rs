@@ -246,14 +246,13 @@ fn download<T: bytemuck::AnyBitPattern>(renderer: &mut Renderer, id: BufferId) -
         .unwrap_or_else(|error| panic!("{id:?}: {error}"))
 }
 
-/// The first three of four, in f64.
-pub fn xyz(v: [f32; 4]) -> DVec3 {
+/// The first three of three or four components, in f64.
+pub fn xyz<const N: usize>(v: [f32; N]) -> DVec3 {
     DVec3::new(v[0].into(), v[1].into(), v[2].into())
 }
 
 /// The object of a visible point or a photon, `None` for a visible point on no matte surface.
-pub fn object(position_object: [f32; 4]) -> Option<u32> {
-    let object = position_object[3].to_bits();
+pub fn object(object: u32) -> Option<u32> {
     (object != NO_OBJECT).then_some(object & !CAUSTIC)
 }
 
@@ -267,22 +266,24 @@ pub fn reach_of(scene: &PackedScene, object: u32) -> DVec3 {
 
 /// A visible point of albedo π on an object, seen from +z.
 pub fn visible_point(position: [f32; 3], object: u32) -> VisiblePoint {
-    let normal = f32::from_bits(cpu::encode_direction(DVec3::Z));
-    let [x, y, z] = position;
+    let normal = cpu::encode_direction(DVec3::Z);
     VisiblePoint {
-        position_object: [x, y, z, f32::from_bits(object)],
-        weight_normal: [1.0, 1.0, 1.0, normal],
-        emitted_normal: [0.0, 0.0, 0.0, normal],
+        position,
+        object,
+        weight: [1.0; 3],
+        geometric_normal: normal,
+        emitted: [0.0; 3],
+        shading_normal: normal,
     }
 }
 
 /// A photon that arrives from +z.
 pub fn photon(position: [f32; 3], object: u32, flux: [f32; 3]) -> Photon {
-    let direction = f32::from_bits(cpu::encode_direction(DVec3::NEG_Z));
-    let ([x, y, z], [r, g, b]) = (position, flux);
     Photon {
-        position_object: [x, y, z, f32::from_bits(object)],
-        flux_direction: [r, g, b, direction],
+        position,
+        object,
+        flux,
+        direction: cpu::encode_direction(DVec3::NEG_Z),
     }
 }
 

@@ -56,13 +56,13 @@ fn points_can_have_photons_where_the_cpu_says_so() {
         let (mut surrounded, mut partly) = (0, 0);
         for (receiver, found) in found.iter().enumerate() {
             let slot = receiver % points.len();
-            let Some(object) = object(points[slot].position_object) else {
+            let Some(object) = object(points[slot].object) else {
                 continue;
             };
-            let normal = cpu::decode_direction(points[slot].weight_normal[3].to_bits());
+            let normal = cpu::decode_direction(points[slot].geometric_normal);
             let reach = reach_of(&bench.scene, object);
             let place = cpu::Place {
-                origin: cpu::offset_origin(xyz(points[slot].position_object), normal, reach),
+                origin: cpu::offset_origin(xyz(points[slot].position), normal, reach),
                 normal,
                 object,
             };

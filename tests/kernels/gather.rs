@@ -66,7 +66,7 @@ fn assert_methods_agree_on(
     let expected = cpu::gather_naive(&seen.with(&radii2), photons);
     let alpha = f64::from(bench.config.alpha);
     let update = |(index, (gathered, before)): (usize, (&cpu::Gathered, &Statistics))| {
-        let weight = xyz(points[index % points.len()].weight_normal);
+        let weight = xyz(points[index % points.len()].weight);
         let mut updated = cpu::Statistics::from(before);
         updated.take(gathered.count, weight * gathered.flux, alpha);
         // The curvature goes the flux's way.
@@ -353,7 +353,7 @@ fn photons_of_another_object_or_from_behind_do_not_count() {
     let points = plane(&bench);
     let statistics = with_radius(&bench, 9.0);
     let from_behind = |mut photon: Photon| {
-        photon.flux_direction[3] = f32::from_bits(cpu::encode_direction(glam::DVec3::Z));
+        photon.direction = cpu::encode_direction(glam::DVec3::Z);
         photon
     };
     let here = photon([0.0; 3], 0, [1.0; 3]);

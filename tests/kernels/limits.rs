@@ -68,7 +68,7 @@ fn an_iteration_that_is_done_again_counts_once() {
             .iter_mut()
             .zip(bench.download::<VisiblePoint>(BufferId::VisiblePoints))
         {
-            *sum += xyz(point.emitted_normal) / f64::from(turn.paths);
+            *sum += xyz(point.emitted) / f64::from(turn.paths);
         }
     }
     for (slot, (sum, seen)) in sums.iter().zip(expected).enumerate() {

@@ -89,7 +89,7 @@ fn the_kd_tree_finds_what_testing_every_photon_finds() {
         .map(|point| {
             let [x, y, z] = point.surface.position.as_vec3().to_array();
             let mut of_kernels = visible_point([x, y, z], point.surface.object);
-            of_kernels.weight_normal[3] = f32::from_bits(cpu::encode_direction(point.bsdf.normals().geometric));
+            of_kernels.geometric_normal = cpu::encode_direction(point.bsdf.normals().geometric);
             of_kernels
         })
         .collect();

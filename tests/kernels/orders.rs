@@ -45,14 +45,14 @@ fn assert_each_point_once(points: &[VisiblePoint], groups: &[Vec<usize>]) {
     let mut slots: Vec<usize> = groups.iter().flatten().copied().collect();
     slots.sort_unstable();
     let expected: Vec<usize> = (0..points.len())
-        .filter(|&slot| object(points[slot].position_object).is_some())
+        .filter(|&slot| object(points[slot].object).is_some())
         .collect();
     assert!(slots == expected, "{} slots, expected {}", slots.len(), expected.len());
 }
 
 fn assert_one_mesh_each(points: &[VisiblePoint], groups: &[Vec<usize>]) {
     for (index, group) in groups.iter().enumerate() {
-        let mesh = |slot: &usize| object(points[*slot].position_object);
+        let mesh = |slot: &usize| object(points[*slot].object);
         assert!(!group.is_empty(), "group {index} has fillers alone");
         assert!(
             group.iter().all(|slot| mesh(slot) == mesh(&group[0])),
@@ -69,7 +69,7 @@ fn points_sorted_by_mesh_fill_all_but_the_last_workgroup_of_each_mesh() {
     assert_one_mesh_each(&points, &groups);
     let mut unfilled: HashMap<Option<u32>, usize> = HashMap::new();
     for group in groups.iter().filter(|group| group.len() < GROUP as usize) {
-        *unfilled.entry(object(points[group[0]].position_object)).or_default() += 1;
+        *unfilled.entry(object(points[group[0]].object)).or_default() += 1;
     }
     assert!(
         unfilled.values().all(|&count| count == 1),
@@ -98,7 +98,7 @@ fn clusters_have_workgroups_of_their_own_and_are_tighter_than_runs() {
     let runs = groups(&bench.download::<u32>(BufferId::MeshOrder));
     let spread = |groups: &[Vec<usize>]| {
         let deviations = groups.iter().map(|group| {
-            let positions: Vec<DVec3> = group.iter().map(|&slot| xyz(points[slot].position_object)).collect();
+            let positions: Vec<DVec3> = group.iter().map(|&slot| xyz(points[slot].position)).collect();
             let mean = positions.iter().sum::<DVec3>() / positions.len() as f64;
             positions.iter().map(|p| p.distance_squared(mean)).sum::<f64>()
         });

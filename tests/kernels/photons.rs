@@ -29,12 +29,8 @@ fn flux_of_objects(groups: &[Vec<Photon>], paths: u32, objects: usize) -> Vec<[f
     let count = groups.len() as f64;
     let of_object = |wanted: u32| {
         let sums = groups.iter().map(|photons| {
-            let on_it = photons
-                .iter()
-                .filter(|photon| object(photon.position_object) == Some(wanted));
-            on_it
-                .map(|photon| xyz(photon.flux_direction).element_sum())
-                .sum::<f64>()
+            let on_it = photons.iter().filter(|photon| object(photon.object) == Some(wanted));
+            on_it.map(|photon| xyz(photon.flux).element_sum()).sum::<f64>()
         });
         let sums: Vec<f64> = sums.collect();
         let mean = sums.iter().sum::<f64>() / count;

@@ -52,7 +52,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
         }
     };
     let mut points: Vec<VisiblePoint> = (0..64).map(|slot| visible_point([0.0; 3], slot)).collect();
-    points[63].position_object[3] = f32::from_bits(NO_OBJECT);
+    points[63].object = NO_OBJECT;
     let mut photons: Vec<Photon> = Vec::new();
     for slot in 0..64 {
         photons.extend((0..arriving(slot)).map(|i| photon([0.0; 3], slot, [1.0, 0.1 + i as f32, 1e-3])));
@@ -209,7 +209,7 @@ fn discs_follow_footprints_and_are_counted_in_their_shells() {
     let mut expected = vec![(0.0, 0, 0f32); 2 * SHELLS];
     for i in 0..receivers as usize {
         let (map, slot, before) = (i / slots, i % slots, f64::from(statistics[i].radius2_high));
-        let Some(_) = object(seen.points[slot].position_object) else {
+        let Some(_) = object(seen.points[slot].object) else {
             continue;
         };
         let of_footprints = |count: f32| (f64::from(count) * f64::from(footprints[slot])).powi(2);
@@ -220,7 +220,7 @@ fn discs_follow_footprints_and_are_counted_in_their_shells() {
             let difference = relative_difference(found.into(), expected);
             assert!(difference < 1e-6, "receiver {i}, {what}: {found}, {expected} expected");
         }
-        let distance = xyz(seen.points[slot].position_object).distance(xyz(bench.settings.camera_position));
+        let distance = xyz(seen.points[slot].position).distance(xyz(bench.settings.camera_position));
         // Shells end at 2^-12, 2^-10, …, 2^2.
         let shell = |distance: f64| {
             ((2.0 * distance.max(1e-30).log2()).floor() as i32 + 28)
@@ -294,13 +294,13 @@ fn cells_want_photons_as_the_visible_points_do_that_reach_them() {
         };
         let wants = |receiver: usize| {
             let slot = receiver % slots;
-            object(seen.points[slot].position_object)?;
+            object(seen.points[slot].object)?;
             let by_photons = (slot..statistics.len()).step_by(slots);
             let by_photons =
                 by_photons.map(|i| mean(cpu::Statistics::from(&statistics[i]).radiance(share(&coverage[i]), emitted)));
             let radiance = mean(xyz(direct[slot].high)) / f64::from(iterations) + by_photons.sum::<f64>();
             let (area, footprint) = (PI * f64::from(radii2[receiver]), f64::from(footprints[slot]));
-            let of_one = mean(xyz(seen.points[slot].weight_normal)) / area;
+            let of_one = mean(xyz(seen.points[slot].weight)) / area;
             Some(of_one * of_one * area / (footprint * footprint) / (radiance * radiance + floor2))
         };
         let mut wanted: Vec<f64> = (0..receivers as usize).filter_map(wants).collect();
@@ -465,11 +465,11 @@ fn pictures_are_resolved_by_equation_4() {
             let shows = |slot: &usize| direct_sums[*slot].high[3] > 0.0 && direct_sums[*slot].low[3] > 0.0;
             let shows: Vec<usize> = of_pixel
                 .filter(shows)
-                .filter(|&slot| object(points[slot].position_object).is_some())
+                .filter(|&slot| object(points[slot].object).is_some())
                 .collect();
             let most = |value: &dyn Fn(usize) -> f64| shows.iter().map(|&slot| value(slot)).fold(0.0, f64::max);
             let width = |slot: usize| {
-                let distance = xyz(points[slot].position_object).distance(xyz(bench.settings.camera_position));
+                let distance = xyz(points[slot].position).distance(xyz(bench.settings.camera_position));
                 f64::from(bench.settings.pixel_spread) * distance
             };
             assert_glass(

@@ -19,8 +19,8 @@ fn last_turn(config: &RenderConfig) -> CameraTurn {
 }
 
 /// Angle between two directions, one of them encoded, rad.
-fn angle(code: f32, direction: glam::DVec3) -> f64 {
-    cpu::decode_direction(code.to_bits()).angle_between(direction)
+fn angle(code: u32, direction: glam::DVec3) -> f64 {
+    cpu::decode_direction(code).angle_between(direction)
 }
 
 fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, least_compared: usize) {
@@ -46,8 +46,8 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
         let Some(expected) = paths[y as usize * width + x as usize].points.first() else {
             continue;
         };
-        let position = xyz(found.position_object);
-        let both = object(found.position_object).is_some()
+        let position = xyz(found.position);
+        let both = object(found.object).is_some()
             && is_straight(position, footprints[slot].into())
             && is_straight(expected.surface.position, expected.footprint);
         if !both {
@@ -57,11 +57,11 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
         let distance = position.distance(expected.surface.position);
         let material = &expected.surface.material;
         // A step of the octahedral code turns a direction by 1.3e-4 rad at the most. A coat that was chosen has its own normal.
-        let mut turned = angle(found.weight_normal[3], normals.geometric);
+        let mut turned = angle(found.geometric_normal, normals.geometric);
         if material.coat == 0.0 {
-            turned = turned.max(angle(found.emitted_normal[3], normals.shading));
+            turned = turned.max(angle(found.shading_normal, normals.shading));
         }
-        let same = object(found.position_object) == Some(expected.surface.object) && distance < 2e-5 && turned < 1.5e-4;
+        let same = object(found.object) == Some(expected.surface.object) && distance < 2e-5 && turned < 1.5e-4;
         places.note(same, || {
             format!("slot {slot}: {found:?} instead of {expected:?}, {distance:e} apart")
         });
@@ -77,7 +77,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
             if cosine < 0.05 || l.dot(normals.geometric) < 0.05 {
                 continue;
             }
-            let response = xyz(found.weight_normal) * gathering.response(slot, l);
+            let response = xyz(found.weight) * gathering.response(slot, l);
             let wanted = expected.bsdf.evaluate(cpu::Width::Wide, expected.viewer, l) / cosine;
             // Reflectances and α are kept as f16, directions in 32 bits.
             let difference = (0..3)
@@ -131,8 +131,8 @@ fn the_bounce_limit_leaves_the_base_of_narrow_surfaces() {
         let surface = &expected.surface;
         let is_narrow = f64::from(surface.material.roughness).powi(2) < FOLLOWED_ALPHA;
         if surface.material.surface == GLOSSY_SURFACE && is_narrow {
-            let same = object(found.position_object) == Some(surface.object)
-                && xyz(found.position_object).distance(surface.position) < 2e-5;
+            let same =
+                object(found.object) == Some(surface.object) && xyz(found.position).distance(surface.position) < 2e-5;
             bases.note(same, || format!("slot {slot}: {found:?} instead of {expected:?}"));
         }
     }

@@ -23,7 +23,7 @@ pub const PATHS: u32 = 65_536;
 /// Of them, what the CPU's independent samples have.
 const PATHS_A_LANE: u32 = 16;
 
-pub fn xyz([x, y, z, _]: [f32; 4]) -> DVec3 {
+pub fn xyz([x, y, z]: [f32; 3]) -> DVec3 {
     dvec3(x.into(), y.into(), z.into())
 }
 
@@ -82,7 +82,7 @@ fn flux(subject: &Subject, lanes: &[Vec<Photon>], channel: usize, weight: impl F
     let of_lane = |lane: &Vec<Photon>| {
         let photons = lane.iter();
         let sum: f64 = photons
-            .map(|photon| xyz(photon.flux_direction)[channel] * weight(photon.position_object[3].to_bits() & !CAUSTIC))
+            .map(|photon| xyz(photon.flux)[channel] * weight(photon.object & !CAUSTIC))
             .sum();
         sum / (paths_a_lane * area_unit)
     };

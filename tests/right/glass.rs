@@ -142,12 +142,12 @@ fn photons_pass_a_plate_as_fresnel_says_at_every_angle() {
         .position(|object| object.name == "floor")
         .expect("a floor");
     for photon in photon_lanes(&mut renderer).iter().flatten() {
-        let cos = ppm_vk::internals::cpu::decode_direction(photon.flux_direction[3].to_bits()).y;
+        let cos = ppm_vk::internals::cpu::decode_direction(photon.direction).y;
         let bin = ((1.0 - cos * cos) / STEEPEST * BINS as f64) as usize;
         if bin < BINS {
-            counts[bin][usize::from(photon.position_object[3].to_bits() & !CAUSTIC == floor as u32)] += 1.0;
+            counts[bin][usize::from(photon.object & !CAUSTIC == floor as u32)] += 1.0;
         }
-        assert!(xyz(photon.flux_direction).min_element() > 0.0, "a photon without flux");
+        assert!(xyz(photon.flux).min_element() > 0.0, "a photon without flux");
     }
     for (bin, [reflected, transmitted]) in counts.into_iter().enumerate() {
         let [from, to] = [bin, bin + 1].map(|edge| STEEPEST * edge as f64 / BINS as f64);

@@ -107,14 +107,11 @@ fn assert_spectrum(prism: &Subject, place: &str, lanes: &[Vec<Photon>]) {
     let mut colors: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
     for lane in lanes {
         let mut sum = DVec3::ZERO;
-        for photon in lane
-            .iter()
-            .filter(|photon| photon.position_object[3].to_bits() & !CAUSTIC == wall)
-        {
-            let y = xyz(photon.position_object).y / normalisation.scale + normalisation.centre.y;
+        for photon in lane.iter().filter(|photon| photon.object & !CAUSTIC == wall) {
+            let y = xyz(photon.position).y / normalisation.scale + normalisation.centre.y;
             if (low - 0.1..high + 0.1).contains(&y) {
-                spectrum.push((y, xyz(photon.flux_direction)));
-                sum += xyz(photon.flux_direction);
+                spectrum.push((y, xyz(photon.flux)));
+                sum += xyz(photon.flux);
             }
         }
         colors[0].push(sum.x - sum.y);

@@ -72,13 +72,13 @@ fn a_grid_of_1e15_cells_takes_no_more_memory_and_finds_every_photon() {
     // One photon within R of every visible point, one past it.
     let mut photons = Vec::new();
     for point in &points {
-        if let Some(object) = object(point.position_object) {
-            let normal = cpu::decode_direction(point.weight_normal[3].to_bits());
+        if let Some(object) = object(point.object) {
+            let normal = cpu::decode_direction(point.geometric_normal);
             let aside = normal.any_orthonormal_vector();
             for part in [0.5, 1.5] {
-                let place = xyz(point.position_object) + aside * (part * f64::from(RADIUS));
+                let place = xyz(point.position) + aside * (part * f64::from(RADIUS));
                 let mut near = photon(place.as_vec3().to_array(), object, [1.0; 3]);
-                near.flux_direction[3] = f32::from_bits(cpu::encode_direction(-normal));
+                near.direction = cpu::encode_direction(-normal);
                 photons.push(near);
             }
         }
@@ -86,7 +86,7 @@ fn a_grid_of_1e15_cells_takes_no_more_memory_and_finds_every_photon() {
     let radii2 = vec![RADIUS * RADIUS; points.len()];
     let found = assert_gathers_agree(&mut bench, "1e15 cells", &points, &radii2, &photons);
     for (slot, (m, point)) in found.iter().zip(&points).enumerate() {
-        let expected = u32::from(object(point.position_object).is_some());
+        let expected = u32::from(object(point.object).is_some());
         assert!(
             *m >= expected,
             "slot {slot}: the photon beside its visible point isn't found"

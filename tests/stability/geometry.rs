@@ -54,7 +54,7 @@ fn assert_patch_is_right(what: &str, model: &Model) {
     let paths = f64::from(config.photons);
     let mut rendered = render(&scene, 0, 1, config);
     let radius = f64::from(rendered.renderer.radius());
-    let power = f64::from(rendered.photons()[0].flux_direction[0]);
+    let power = f64::from(rendered.photons()[0].flux[0]);
     let of_one = f64::from(ALBEDO) * power / (PI * PI * radius * radius);
     let deviation = (f64::from(ALBEDO) * of_one / paths).sqrt();
     let seen = f64::from(rendered.image.pixels()[0][0]);

@@ -111,7 +111,7 @@ fn lamp_in_a_glass_ball(smooth: bool) -> (Vec<Photon>, f64) {
 const LAMP: u32 = 6;
 
 fn mean_flux(photons: &[Photon]) -> f64 {
-    let flux = |photon: &Photon| f64::from(photon.flux_direction[0]);
+    let flux = |photon: &Photon| f64::from(photon.flux[0]);
     photons.iter().map(flux).sum::<f64>() / photons.len() as f64
 }
 
@@ -131,7 +131,7 @@ fn what_a_smooth_glass_ball_reflects_comes_back_to_the_lamp_in_its_middle() {
     let (photons, emitted) = lamp_in_a_glass_ball(true);
     let arrived = mean_flux(&photons);
     assert!((arrived / emitted - 1.0).abs() < 1e-3, "{arrived} of {emitted} arrives");
-    let returned = |photon: &&Photon| object(photon.position_object) == Some(LAMP);
+    let returned = |photon: &&Photon| object(photon.object) == Some(LAMP);
     let paths = photons.len() as f64;
     let back = photons.iter().filter(returned).count() as f64 / paths;
     let expected = 0.04;
@@ -184,11 +184,8 @@ fn reflectance_at_the_critical_angle_is_fresnels_to_within_rounding_of_the_angle
                 .map(f64::from);
             let cos_i = direction(&settings, x + 0.5, y + 0.5).z;
             let sin2_t = f64::from(IOR * IOR) * (1.0 - cos_i * cos_i);
-            let throughput = |point: &VisiblePoint| f64::from(point.weight_normal[0]) * PI;
-            let seen = points
-                .iter()
-                .filter(|point| point.position_object[3].to_bits() != NO_OBJECT)
-                .count();
+            let throughput = |point: &VisiblePoint| f64::from(point.weight[0]) * PI;
+            let seen = points.iter().filter(|point| point.object != NO_OBJECT).count();
             let found = if seen == 2 {
                 partial += 1;
                 // The refracted ray's radiance counts n² times inside.

@@ -96,26 +96,11 @@ pub fn assert_sound(renderer: &mut Renderer) -> Image {
     let sums: Vec<DirectSum> = download(renderer, BufferId::DirectSums, slots);
 
     let first3 = |v: [f32; 4]| [v[0], v[1], v[2]];
-    assert_numbers(
-        "positions of Photons",
-        photons.iter().map(|photon| first3(photon.position_object)),
-    );
-    assert_amounts(
-        "flux of Photons",
-        photons.iter().map(|photon| first3(photon.flux_direction)),
-    );
-    assert_numbers(
-        "positions of VisiblePoints",
-        points.iter().map(|point| first3(point.position_object)),
-    );
-    assert_amounts(
-        "weights of VisiblePoints",
-        points.iter().map(|point| first3(point.weight_normal)),
-    );
-    assert_amounts(
-        "radiance of VisiblePoints",
-        points.iter().map(|point| first3(point.emitted_normal)),
-    );
+    assert_numbers("positions of Photons", photons.iter().map(|photon| photon.position));
+    assert_amounts("flux of Photons", photons.iter().map(|photon| photon.flux));
+    assert_numbers("positions of VisiblePoints", points.iter().map(|point| point.position));
+    assert_amounts("weights of VisiblePoints", points.iter().map(|point| point.weight));
+    assert_amounts("radiance of VisiblePoints", points.iter().map(|point| point.emitted));
     assert_amounts("R² of StatisticsOf", statistics.iter().map(|s| [s.radius2_high; 3]));
     assert_amounts("τ of StatisticsOf", statistics.iter().map(|s| first3(s.flux_high)));
     assert_numbers(
@@ -131,7 +116,7 @@ pub fn assert_sound(renderer: &mut Renderer) -> Image {
     assert_numbers("rest of DirectSums", sums.iter().map(|sum| first3(sum.low)));
     assert_amounts("Film", image.pixels().iter().copied());
     for (slot, (s, point)) in statistics.iter().zip(&points).enumerate() {
-        let sees_a_surface = point.position_object[3].to_bits() != NO_OBJECT;
+        let sees_a_surface = point.object != NO_OBJECT;
         let has_photons = (s.accepted_low | s.accepted_high) != 0;
         assert!(
             !(sees_a_surface && has_photons) || s.radius2_high > 0.0,

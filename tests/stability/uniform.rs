@@ -61,12 +61,8 @@ pub fn assert_lit_by_photons(what: &str, scene: &Scene, radiances: &[f32]) {
     assert_eq!(balls.len(), radiances.len(), "balls");
     for (ball, radiance) in balls.into_iter().zip(radiances) {
         let received = PI * f64::from(*radiance) * scene.object_area(ball);
-        let on_ball = photons
-            .iter()
-            .filter(|photon| object(photon.position_object) == Some(ball));
-        let mut samples: Vec<f64> = on_ball
-            .map(|photon| f64::from(photon.flux_direction[0]) / received)
-            .collect();
+        let on_ball = photons.iter().filter(|photon| object(photon.object) == Some(ball));
+        let mut samples: Vec<f64> = on_ball.map(|photon| f64::from(photon.flux[0]) / received).collect();
         samples.resize(PATHS as usize, 0.0);
         assert_mean(
             &format!("{what}, in light of {radiance:e}, by photons"),
