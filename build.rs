@@ -15,7 +15,7 @@ use std::{env, fs};
 use anyhow::{Context, Result, bail, ensure};
 use spirq::ReflectConfig;
 use spirq::entry_point::EntryPoint;
-use spirq::ty::{AccessType, DescriptorType, StructType, Type};
+use spirq::ty::{AccessType, DescriptorType, ScalarType, StructType, Type};
 use spirq::var::Variable;
 
 fn main() -> Result<()> {
@@ -46,6 +46,7 @@ fn main() -> Result<()> {
     let compiler = shaderc::Compiler::new().context("shaderc: no compiler")?;
     let mut module = String::new();
     let mut names = Vec::new();
+    let mut push_constants = BTreeMap::new();
     for source in &sources {
         let name = source
             .file_stem()
@@ -65,8 +66,10 @@ fn main() -> Result<()> {
             fs::write(out.join(format!("{name}.ray_query.spv")), module.as_binary_u8())?;
         }
         describe(&mut module, &name, &entry_point, by_query.is_some()).with_context(|| source.display().to_string())?;
+        add_push_constants(&mut push_constants, &entry_point).with_context(|| source.display().to_string())?;
         names.push(name.to_uppercase());
     }
+    module.extend(push_constants.into_values());
     writeln!(
         module,
         "/// Every stage's shader.\npub static ALL: &[&Shader] = &[{}];",
@@ -302,6 +305,52 @@ fn describe(module: &mut String, name: &str, entry_point: &EntryPoint, by_query:
         constants.join(", ")
     )?;
     Ok(())
+}
+
+/// Adds the Rust struct of the stage's push constants. Stages may share a block; it must be the same in all of them.
+fn add_push_constants(structs: &mut BTreeMap<String, String>, entry_point: &EntryPoint) -> Result<()> {
+    let blocks = entry_point.vars.iter().filter_map(|variable| match variable {
+        Variable::PushConstant {
+            ty: Type::Struct(block),
+            ..
+        } => Some(block),
+        _ => None,
+    });
+    for block in blocks {
+        let name = block.name().context("push constants without a name")?;
+        let mut fields = String::new();
+        let mut end = 0;
+        for member in &block.members {
+            ensure!(member.offset == Some(end), "{name}: padding between push constants");
+            end += size(&member.ty)?;
+            let field = member.name.as_deref().context("a push constant without a name")?;
+            write!(fields, "pub {field}: {}, ", rust_type(&member.ty)?)?;
+        }
+        let declaration = format!(
+            "/// Push constants.\n#[repr(C)]\n#[derive(Debug, Clone, Copy, bytemuck::NoUninit)]\n\
+             #[allow(missing_docs, reason = \"GLSL has the comments\")]\npub struct {name} {{ {fields}}}\n\
+             impl crate::stage::PushConstants for {name} {{ const NAME: &str = \"{name}\"; }}\n"
+        );
+        let known = structs.entry(name.to_owned()).or_insert_with(|| declaration.clone());
+        ensure!(*known == declaration, "two blocks of push constants are named {name}");
+    }
+    Ok(())
+}
+
+fn rust_type(ty: &Type) -> Result<String> {
+    let scalar = |scalar: &ScalarType| match scalar {
+        ScalarType::Integer {
+            bits: 32,
+            is_signed: false,
+        } => Ok("u32"),
+        ScalarType::Float { bits: 32, .. } => Ok("f32"),
+        other => bail!("no Rust type for {other:?}"),
+    };
+    Ok(match ty {
+        Type::Scalar(ty) => scalar(ty)?.to_owned(),
+        Type::Vector(ty) => format!("[{}; {}]", scalar(&ty.scalar_ty)?, ty.nscalar),
+        other => bail!("no Rust type for {other:?}"),
+    })
 }
 
 /// Appends `STRUCTS`, the element of each buffer that the probe binds.

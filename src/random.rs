@@ -4,6 +4,7 @@ mod sobol;
 
 use crate::config::{RenderConfig, SEQUENCES, Sampler};
 use crate::layout::{CAMERA_PATH, COVERAGE_SAMPLE, LIGHT_SAMPLE, PHOTON_PATH};
+use crate::shaders;
 
 /// The kind of a path: mixed into the seed, so that kinds have different numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,10 +52,12 @@ impl CameraTurn {
     pub fn others(self) -> impl Iterator<Item = Self> {
         (1..self.paths).map(move |path| Self { path, ..self })
     }
+}
 
-    /// As push constants.
-    pub fn words(self) -> [u32; 3] {
-        [self.iteration, self.path, self.paths]
+impl From<CameraTurn> for shaders::CameraTurnPush {
+    fn from(turn: CameraTurn) -> Self {
+        let CameraTurn { iteration, path, paths } = turn;
+        Self { iteration, path, paths }
     }
 }
 

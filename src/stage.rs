@@ -296,6 +296,12 @@ impl Shader {
     }
 }
 
+/// A block of push constants. `build.rs` generates a struct for each block in GLSL.
+pub trait PushConstants: bytemuck::NoUninit {
+    /// The block's name in GLSL.
+    const NAME: &str;
+}
+
 /// A launch of a stage.
 #[derive(Debug, Clone)]
 pub struct StageDesc {
@@ -332,8 +338,10 @@ impl StageDesc {
         self.shader.ray_query.filter(|_| asked)
     }
 
-    /// With these push constants.
-    pub fn push<T: bytemuck::NoUninit>(mut self, constants: T) -> Self {
+    /// With these push constants, the shader's.
+    pub fn push<T: PushConstants>(mut self, constants: T) -> Self {
+        let expected = self.shader.push_constants.map(|block| block.name);
+        assert_eq!(Some(T::NAME), expected, "push constants of {}", self.shader.name);
         self.push = bytemuck::bytes_of(&constants).to_vec();
         self
     }

@@ -6,6 +6,7 @@ use ppm_vk::internals::gather::METHODS;
 use ppm_vk::internals::layout::VISIBLE_LOBES;
 use ppm_vk::internals::packing::SceneFeatures;
 use ppm_vk::internals::pipeline::Stages;
+use ppm_vk::internals::random::CameraTurn;
 use ppm_vk::internals::record::{Command, Recording};
 use ppm_vk::internals::shaders;
 use ppm_vk::internals::sizes::{Limits, Sizes};
@@ -120,7 +121,7 @@ fn stages_that_share_no_written_buffer_run_without_a_barrier() {
     assert_eq!(recording.commands().len(), 2);
     recording.dispatch(
         StageDesc::new(&shaders::DIRECT, 64)
-            .push([0u32, 0, 1])
+            .push(shaders::CameraTurnPush::from(CameraTurn::FIRST))
             .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
     );
     assert_eq!(recording.commands().len(), 4, "a write before a read needs one barrier");

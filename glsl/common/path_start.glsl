@@ -1,6 +1,6 @@
 // Starts of photon paths: `emission` writes them, `photons` reads them. Include after random.glsl and settings.glsl.
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform PathsPush {
     uint iteration;
     uint block;             // see config::RenderConfig::block_of
     uint first_of_sequence; // paths of the block before this iteration, of its sequence

@@ -5,7 +5,7 @@
 
 const uint MOST_DIGITS = 256u;
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform SortPush {
     uint shift;
     uint bits; // of a digit
     uint tiles;

@@ -5,7 +5,7 @@
 
 const uint WINDOW = 4u; // runs on either side
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform ClustersPush {
     uint runs;
 } push;
 

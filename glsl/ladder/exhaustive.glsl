@@ -7,7 +7,7 @@ layout(constant_id = 2) const bool BY_MESH = false;
 // Photons beyond R are rejected by the built-in distance() instead of a squared distance.
 layout(constant_id = 3) const bool DISTANCE = false;
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform ExhaustivePush {
     uint first;  // the photons of this launch: drivers cut long loops
     uint end;
     uint stride; // only every stride-th group of visible points is processed: 1 except in benches

@@ -18,7 +18,7 @@ layout(local_size_x = 64) in;
 #include "common/status.glsl"
 
 // The part of the sorted photons that this launch tests.
-layout(push_constant) uniform Push {
+layout(push_constant) uniform ClusterGridPush {
     uint first;
     uint end;
     uint groups; // of visible points

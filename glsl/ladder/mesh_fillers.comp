@@ -6,7 +6,7 @@ layout(local_size_x = 64) in;
 
 #include "common/invocation.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform MeshFillersPush {
     uint meshes;
     uint group; // visible points of a workgroup
 } push;

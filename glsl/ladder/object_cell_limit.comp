@@ -7,7 +7,7 @@ layout(local_size_x = 64) in;
 #include "common/invocation.glsl"
 #include "common/status.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform ObjectCellLimitPush {
     uint cells;
     uint maximum;
 } push;

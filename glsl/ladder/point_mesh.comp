@@ -11,7 +11,7 @@ layout(local_size_x = 64) in;
 // Whether the points are ordered already; equal keys keep that order.
 layout(constant_id = 0) const bool PRESORTED = false;
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform MeshesPush {
     uint meshes;
 } push;
 

@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 #include "settings.glsl"
 #include "gather/visible_point.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform MeshesPush {
     uint meshes;
 } push;
 

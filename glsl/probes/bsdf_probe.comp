@@ -11,7 +11,7 @@ layout(local_size_x = 64) in;
 #include "trace/interaction.glsl"
 #include "bsdf/bsdf.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform CountPush {
     uint count;
 } push;
 

@@ -7,7 +7,7 @@ layout(local_size_x = 64) in;
 #include "common/invocation.glsl"
 #include "common/random.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform CountPush {
     uint count;
 } push;
 

@@ -21,7 +21,7 @@ layout(constant_id = 1) const uint SLOTS = 1u;
 layout(constant_id = 2) const bool JITTER = true;
 layout(constant_id = 19) const bool LENS = false;
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform CameraTurnPush {
     uint iteration;
     uint path;  // index of the camera path among those of the pixel in this iteration
     uint paths;

@@ -17,7 +17,7 @@ layout(local_size_x = 64) in;
 #include "gather/statistics.glsl"
 #include "common/status.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform CoveragePush {
     uint iteration;
     uint points; // a power of two up to COVERAGE_WHOLE
 } push;

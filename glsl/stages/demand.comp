@@ -14,7 +14,7 @@ layout(local_size_x = 64) in;
 #include "gather/grid.glsl"
 #include "gather/demand.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform DemandPush {
     uint iterations; // done so far
     float emitted;   // photon paths of all of them
 } push;

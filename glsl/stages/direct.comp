@@ -22,7 +22,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
 layout(constant_id = 24) const bool ASKS_BEHIND_GLASS = true; // in this iteration, see RenderConfig::asks_behind_glass
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform CameraTurnPush {
     uint iteration;
     uint path;  // index of the camera path among those of the pixel in this iteration
     uint paths;

@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 #include "gather/visible_point.glsl"
 #include "gather/statistics.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform FitRadiusPush {
     vec2 wanted; // number of photons of each map
     float least; // lower bound of R, in footprints
 } push;

@@ -22,7 +22,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 1) const uint RUN = 8u;
 
 // The part of the sorted photons that this launch tests.
-layout(push_constant) uniform Push {
+layout(push_constant) uniform GatherClusteredPush {
     uint first;
     uint end;
 } push;

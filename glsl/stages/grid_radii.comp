@@ -11,7 +11,7 @@ layout(local_size_x = 64) in;
 #include "gather/statistics.glsl"
 #include "gather/grid.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform GridRadiiPush {
     uint step; // the mean is over every step-th slot
 } push;
 

@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 #include "common/texel.glsl"
 #include "trace/intersect.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform CountPush {
     uint count;
 } push;
 

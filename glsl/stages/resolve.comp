@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 #include "gather/statistics.glsl"
 #include "common/status.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform ResolvePush {
     uint iterations;
     float emitted; // photon paths of all iterations
     uint camera_paths; // per pixel, of all iterations

@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 #include "gather/visible_point.glsl"
 #include "common/status.glsl"
 
-layout(push_constant) uniform Push { uint iterations; } push; // of the sequence
+layout(push_constant) uniform ResolveSequencePush { uint iterations; } push; // of the sequence
 
 layout(std430) readonly buffer SequenceSums { vec4 sequence_sums[]; };
 layout(std430) writeonly buffer SequenceFilm { vec4 sequence_film[]; }; // row-major, from the top left; w: curvature

@@ -9,7 +9,7 @@ layout(local_size_x = 128) in;
 
 const uint PER_THREAD = SCAN_BLOCK / gl_WorkGroupSize.x;
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform CountPush {
     uint count;
 } push;
 

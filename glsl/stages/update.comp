@@ -14,7 +14,7 @@ layout(local_size_x = 64) in;
 #include "gather/radius.glsl"
 #include "common/status.glsl"
 
-layout(push_constant) uniform Push { float photons; } push; // paths of an iteration
+layout(push_constant) uniform UpdatePush { float photons; } push; // paths of an iteration
 
 uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer Radii2 { float radii2[]; };

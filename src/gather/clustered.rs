@@ -10,7 +10,11 @@ use crate::stage::{BufferId, StageDesc};
 /// Cell sizes of the hashed grids, from the radii.
 pub fn grid_sizes(sizes: &Sizes, recording: &mut Recording) {
     recording.fill(BufferId::RadiiOfShells, 0);
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, sizes.receivers()).push(sizes.radius_step()));
+    recording.dispatch(
+        StageDesc::new(&shaders::GRID_RADII, sizes.receivers()).push(shaders::GridRadiiPush {
+            step: sizes.radius_step(),
+        }),
+    );
     recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup));
 }
 
@@ -28,7 +32,7 @@ pub fn hashed_grid(sizes: &Sizes, recording: &mut Recording) {
         recording.dispatch(
             gather_stage(&shaders::GATHER_CLUSTERED, runs, sizes)
                 .constant("RUN", sizes.clustered_run)
-                .push([first, end]),
+                .push(shaders::GatherClusteredPush { first, end }),
         );
     }
 }

@@ -14,13 +14,13 @@ pub fn scan(buffer: BufferId, count: u32, recording: &mut Recording) {
     let threads = blocks * shaders::SCAN_BLOCKS.workgroup;
     recording.dispatch(
         StageDesc::new(&shaders::SCAN_BLOCKS, threads)
-            .push(count)
+            .push(shaders::CountPush { count })
             .bind(bound.to_vec()),
     );
     let threads = blocks * shaders::SCAN_ADD.workgroup;
     recording.dispatch(
         StageDesc::new(&shaders::SCAN_ADD, threads)
-            .push(count)
+            .push(shaders::CountPush { count })
             .bind(bound.to_vec()),
     );
 }
@@ -80,7 +80,11 @@ pub fn sort(count: BufferId, capacity: u32, bits: u32, pairs: [Pairs; 2], record
         ] {
             recording.dispatch(
                 StageDesc::new(shader, groups * shader.workgroup)
-                    .push([shift, pass_bits, tiles])
+                    .push(shaders::SortPush {
+                        shift,
+                        bits: pass_bits,
+                        tiles,
+                    })
                     .bind(bound.clone()),
             );
         }

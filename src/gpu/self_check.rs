@@ -26,7 +26,7 @@ impl Device {
         }
         self.create(BufferId::ScanTotal, 4)?;
         let mut recording = Recording::new();
-        recording.dispatch(StageDesc::new(&shaders::LOOP_PROBE, 1).push(ASKED));
+        recording.dispatch(StageDesc::new(&shaders::LOOP_PROBE, 1).push(shaders::CountPush { count: ASKED }));
         self.run(&recording)?;
         let done: Vec<u32> = self.download(BufferId::ScanTotal, Some(1))?;
         let limit = match done.first() {

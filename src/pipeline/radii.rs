@@ -67,7 +67,10 @@ impl Renderer {
                 gather(stages.sizes, &mut recording);
                 recording
             })?;
-            let push = [global, caustic, radius::LEAST_FOOTPRINTS];
+            let push = shaders::FitRadiusPush {
+                wanted: [global, caustic],
+                least: radius::LEAST_FOOTPRINTS,
+            };
             let mut recording = Recording::new();
             recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, self.sizes.receivers()).push(push));
             self.run(&recording)?;

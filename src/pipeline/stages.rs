@@ -89,14 +89,18 @@ impl Stages<'_> {
         self.direct(turn, asks, recording);
         // The paper has no such correction.
         if self.config.estimator == Estimator::Sppm {
-            recording.dispatch(
-                self.ray_stage(&shaders::COVERAGE, self.sizes.receivers())
-                    .push([iteration, self.config.coverage_points(iteration)]),
-            );
+            recording.dispatch(self.ray_stage(&shaders::COVERAGE, self.sizes.receivers()).push(
+                shaders::CoveragePush {
+                    iteration,
+                    points: self.config.coverage_points(iteration),
+                },
+            ));
         }
         recording.dispatch(
             StageDesc::new(&shaders::UPDATE, self.sizes.slots())
-                .push([photons as f32])
+                .push(shaders::UpdatePush {
+                    photons: photons as f32,
+                })
                 .bind(vec![sums_of(iteration)]),
         );
         // After the photons, because an iteration that has to be repeated must stop before it adds anything.
@@ -114,7 +118,11 @@ impl Stages<'_> {
             emitted,
             camera_paths,
         } = totals.at_least_one();
-        let push = [iterations, (emitted as f32).to_bits(), camera_paths];
+        let push = shaders::ResolvePush {
+            iterations,
+            emitted: emitted as f32,
+            camera_paths,
+        };
         recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
         recording
     }
@@ -126,7 +134,9 @@ impl Stages<'_> {
         for (sequence, (sums, film)) in (0..).zip(SEQUENCE_SUMS.into_iter().zip(SEQUENCE_FILMS)) {
             recording.dispatch(
                 StageDesc::new(&shaders::RESOLVE_SEQUENCE, self.sizes.pixel_slots)
-                    .push([iterations_of(sequence, iterations)])
+                    .push(shaders::ResolveSequencePush {
+                        iterations: iterations_of(sequence, iterations),
+                    })
                     .bind(vec![(BufferId::SequenceSums, sums), (BufferId::SequenceFilm, film)]),
             );
         }
@@ -142,7 +152,7 @@ impl Stages<'_> {
     pub(super) fn camera(&self, turn: CameraTurn, recording: &mut Recording) {
         recording.dispatch(
             self.ray_stage(&shaders::CAMERA, self.sizes.pixel_slots)
-                .push(turn.words()),
+                .push(shaders::CameraTurnPush::from(turn)),
         );
     }
 
@@ -151,7 +161,7 @@ impl Stages<'_> {
         recording.dispatch(
             self.ray_stage(&shaders::DIRECT, self.sizes.slots())
                 .constant("ASKS_BEHIND_GLASS", u32::from(asks))
-                .push(turn.words())
+                .push(shaders::CameraTurnPush::from(turn))
                 .bind(vec![sums_of(turn.iteration)]),
         );
     }
@@ -166,7 +176,10 @@ impl Stages<'_> {
     pub(super) fn demand(&self, iterations: u32, recording: &mut Recording) {
         if self.config.drops_unwanted() {
             let emitted = u64::from(iterations) * u64::from(self.config.photons);
-            let push = [iterations, (emitted as f32).to_bits()];
+            let push = shaders::DemandPush {
+                iterations,
+                emitted: emitted as f32,
+            };
             recording.fill(BufferId::Demand, 0);
             recording.dispatch(StageDesc::new(&shaders::DEMAND, self.sizes.receivers()).push(push));
         }
@@ -184,13 +197,13 @@ impl Stages<'_> {
     /// Traces a range of paths of an iteration.
     pub(super) fn trace_paths(&self, iteration: u32, paths: Range<u32>, recording: &mut Recording) {
         let lanes = self.sizes.photon_lanes;
-        let push = [
+        let push = shaders::PathsPush {
             iteration,
-            self.config.block_of(iteration),
-            self.config.first_of_sequence(iteration),
-            paths.start,
-            paths.len() as u32,
-        ];
+            block: self.config.block_of(iteration),
+            first_of_sequence: self.config.first_of_sequence(iteration),
+            first_path: paths.start,
+            path_count: paths.len() as u32,
+        };
         recording.dispatch(self.ray_stage(&shaders::EMISSION, paths.len() as u32).push(push));
         recording.dispatch(self.ray_stage(&shaders::PHOTONS, lanes).push(push));
     }

@@ -25,7 +25,10 @@ fn on_device(bench: &mut Bench, points: &[VisiblePoint], radii2: &[f32], statist
         .into_iter()
         .chain(features)
         .collect();
-    let push = [0, bench.config.coverage_points(0)];
+    let push = shaders::CoveragePush {
+        iteration: 0,
+        points: bench.config.coverage_points(0),
+    };
     recording.dispatch(
         StageDesc::new(&shaders::COVERAGE, radii2.len() as u32)
             .constants(constants)

@@ -103,7 +103,9 @@ fn assert_methods_agree_on(
         let update = StageDesc::new(&shaders::UPDATE, points.len() as u32);
         recording.dispatch(
             update
-                .push([bench.config.photons as f32])
+                .push(shaders::UpdatePush {
+                    photons: bench.config.photons as f32,
+                })
                 .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
         );
         bench

@@ -62,7 +62,7 @@ fn an_iteration_that_is_done_again_counts_once() {
         let mut recording = Recording::new();
         let constants = vec![("BRUTE_FORCE", 1), ("MIRRORS", 1), ("DIELECTRICS", 1)];
         let camera = StageDesc::new(&shaders::CAMERA, bench.renderer.sizes().pixel_slots);
-        recording.dispatch(camera.constants(constants).push(turn.words()));
+        recording.dispatch(camera.constants(constants).push(shaders::CameraTurnPush::from(turn)));
         bench.renderer.run(&recording).expect("a camera stage");
         for (sum, point) in expected
             .iter_mut()

@@ -40,7 +40,7 @@ fn probe<A: Pod, F: Pod>(
     recording.dispatch(
         StageDesc::new(shader, count as u32)
             .constants(constants)
-            .push(count as u32),
+            .push(shaders::CountPush { count: count as u32 }),
     );
     gpu.run(&recording).expect("a run");
     gpu.download(BufferId::ProbeTo, Some(count)).expect("a download")

@@ -82,7 +82,9 @@ impl Probe {
         recording.dispatch(
             StageDesc::new(&shaders::RAY_PROBE, rays.len() as u32)
                 .constants(constants)
-                .push(rays.len() as u32),
+                .push(shaders::CountPush {
+                    count: rays.len() as u32,
+                }),
         );
         gpu.run(&recording).expect("a run");
         gpu.download(BufferId::ProbeTo, Some(rays.len())).expect("hits")

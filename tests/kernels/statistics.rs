@@ -77,7 +77,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
         naive(bench.renderer.sizes(), &mut recording);
         recording.dispatch(
             StageDesc::new(&shaders::UPDATE, 64)
-                .push([1f32])
+                .push(shaders::UpdatePush { photons: 1.0 })
                 .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
         );
     }
@@ -156,7 +156,7 @@ fn radii_shrink_where_more_photons_than_wanted_were_found_but_not_below_a_part_o
     bench.upload(BufferId::StatisticsOf, &statistics);
     bench.upload(BufferId::Footprints, &footprints);
     let mut recording = Recording::new();
-    let push = [wanted[0], wanted[1], least];
+    let push = shaders::FitRadiusPush { wanted, least };
     recording.dispatch(StageDesc::new(&shaders::FIT_RADIUS, receivers).push(push));
     bench.renderer.run(&recording).expect("a run");
 
@@ -197,7 +197,7 @@ fn discs_follow_footprints_and_are_counted_in_their_shells() {
     let mut recording = Recording::new();
     recording.dispatch(StageDesc::new(&shaders::RADII, receivers));
     recording.fill(BufferId::RadiiOfShells, 0);
-    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, receivers).push(step));
+    recording.dispatch(StageDesc::new(&shaders::GRID_RADII, receivers).push(shaders::GridRadiiPush { step }));
     recording.dispatch(StageDesc::new(&shaders::GRID_SETUP, shaders::GRID_SETUP.workgroup));
     bench.renderer.run(&recording).expect("radii");
 
@@ -276,7 +276,10 @@ fn cells_want_photons_as_the_visible_points_do_that_reach_them() {
         let receivers = bench.renderer.sizes().receivers();
         let mut recording = Recording::new();
         recording.fill(BufferId::Demand, 0);
-        let push = [iterations, (emitted as f32).to_bits()];
+        let push = shaders::DemandPush {
+            iterations,
+            emitted: emitted as f32,
+        };
         recording.dispatch(StageDesc::new(&shaders::DEMAND, receivers).push(push));
         bench.renderer.run(&recording).expect("demand");
         let found: Vec<f32> = bench.download(BufferId::Demand);

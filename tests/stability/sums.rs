@@ -114,7 +114,7 @@ fn iterate(bench: &mut Bench, iterations: u32, arriving: impl Fn(u32) -> u32) {
         recording.dispatch(StageDesc::new(&shaders::RADII, SLOTS));
         recording.dispatch(
             StageDesc::new(&shaders::UPDATE, SLOTS)
-                .push([1f32])
+                .push(shaders::UpdatePush { photons: 1.0 })
                 .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
         );
     }
@@ -165,7 +165,7 @@ fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
     update.dispatch(StageDesc::new(&shaders::RADII, SLOTS));
     update.dispatch(
         StageDesc::new(&shaders::UPDATE, SLOTS)
-            .push([1f32])
+            .push(shaders::UpdatePush { photons: 1.0 })
             .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
     );
     let mut exact = Exact::START;

@@ -111,7 +111,14 @@ impl Exhaustive {
         for first in (0..photons).step_by(EXHAUSTIVE_RANGE as usize) {
             let end = first.saturating_add(EXHAUSTIVE_RANGE);
             for map in 0..sizes.photon_maps {
-                let push = [first, end, stride, groups, dealing(groups), map];
+                let push = shaders::ExhaustivePush {
+                    first,
+                    end,
+                    stride,
+                    groups,
+                    factor: dealing(groups),
+                    map,
+                };
                 let stage = gather_stage(shader, groups * GROUP, sizes).push(push);
                 let mut constants = stage.constants.to_vec();
                 constants.extend([
@@ -148,7 +155,9 @@ pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
     recording.fill(BufferId::ObjectCells, 0);
     recording.dispatch(StageDesc::new(&shaders::OBJECT_CELL_COUNT, photons));
     if let Some(maximum) = sizes.cell_photons {
-        recording.dispatch(StageDesc::new(&shaders::OBJECT_CELL_LIMIT, cells).push([cells, maximum]));
+        recording.dispatch(
+            StageDesc::new(&shaders::OBJECT_CELL_LIMIT, cells).push(shaders::ObjectCellLimitPush { cells, maximum }),
+        );
     }
     scan(BufferId::ObjectCells, cells + 1, recording);
     recording.fill(BufferId::ObjectCellCursors, 0);
@@ -157,7 +166,14 @@ pub fn object_grids(sizes: &Sizes, recording: &mut Recording) {
     for [first, end] in parts(sizes) {
         for map in 0..sizes.photon_maps {
             let stage = gather_stage(&shaders::GATHER_CLUSTER_GRID, groups * GROUP, sizes);
-            recording.dispatch(stage.push([first, end, groups, dealing(groups), map]));
+            let push = shaders::ClusterGridPush {
+                first,
+                end,
+                groups,
+                factor: dealing(groups),
+                map,
+            };
+            recording.dispatch(stage.push(push));
         }
     }
 }

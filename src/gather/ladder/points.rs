@@ -19,14 +19,15 @@ pub fn by_mesh(sizes: &Sizes, recording: &mut Recording) {
 pub fn by_cluster(sizes: &Sizes, recording: &mut Recording) {
     sort_by_mesh(sizes, true, BufferId::MeshOrder, recording);
     let runs = sizes.runs();
-    recording.dispatch(StageDesc::new(&shaders::CLUSTER_SEEDS, runs).push(runs));
+    let push = shaders::ClustersPush { runs };
+    recording.dispatch(StageDesc::new(&shaders::CLUSTER_SEEDS, runs).push(push));
     for _ in 0..LLOYD_ROUNDS {
-        recording.dispatch(StageDesc::new(&shaders::CLUSTER_ASSIGN, runs * GROUP).push(runs));
-        recording.dispatch(StageDesc::new(&shaders::CLUSTER_MEANS, runs).push(runs));
+        recording.dispatch(StageDesc::new(&shaders::CLUSTER_ASSIGN, runs * GROUP).push(push));
+        recording.dispatch(StageDesc::new(&shaders::CLUSTER_MEANS, runs).push(push));
     }
     scan(BufferId::ClusterStarts, runs, recording);
     recording.fill(BufferId::PointOrder, NO_SLOT);
-    recording.dispatch(StageDesc::new(&shaders::CLUSTER_PLACE, runs).push(runs));
+    recording.dispatch(StageDesc::new(&shaders::CLUSTER_PLACE, runs).push(push));
 }
 
 /// Sorts the points by mesh, optionally along a curve within each, and writes them with fillers to `order`.
@@ -40,7 +41,7 @@ fn sort_by_mesh(sizes: &Sizes, along_curve: bool, order: BufferId, recording: &m
     recording.fill(BufferId::MeshFillers, 0);
     recording.dispatch(
         StageDesc::new(&shaders::POINT_MESH, slots)
-            .push(meshes)
+            .push(shaders::MeshesPush { meshes })
             .constants(vec![("PRESORTED", u32::from(along_curve))])
             .bind(vec![
                 (BufferId::KeysOut, pairs[0].keys),
@@ -50,12 +51,18 @@ fn sort_by_mesh(sizes: &Sizes, along_curve: bool, order: BufferId, recording: &m
     // Keys go up to the number of meshes.
     let bits = u32::BITS - meshes.leading_zeros();
     let [sorted, _] = sort(BufferId::PointCount, slots, bits, pairs, recording);
-    recording.dispatch(StageDesc::new(&shaders::MESH_FILLERS, meshes).push([meshes, GROUP]));
+    recording.dispatch(
+        StageDesc::new(&shaders::MESH_FILLERS, meshes).push(shaders::MeshFillersPush { meshes, group: GROUP }),
+    );
     scan(BufferId::MeshFillers, meshes, recording);
     recording.fill(order, NO_SLOT);
-    recording.dispatch(StageDesc::new(&shaders::POINT_PLACE, slots).push(meshes).bind(vec![
-        (BufferId::KeysIn, sorted.keys),
-        (BufferId::ValuesIn, sorted.values),
-        (BufferId::OrderOut, order),
-    ]));
+    recording.dispatch(
+        StageDesc::new(&shaders::POINT_PLACE, slots)
+            .push(shaders::MeshesPush { meshes })
+            .bind(vec![
+                (BufferId::KeysIn, sorted.keys),
+                (BufferId::ValuesIn, sorted.values),
+                (BufferId::OrderOut, order),
+            ]),
+    );
 }
