@@ -1,9 +1,9 @@
-//! Draws the learned distribution of starts of a source's photon paths:
-//! `cargo run --release --example draw_aim -- SCENE.gltf OUT.png [ITERATIONS]`
-//! For a directional light: its starts on the plane across its rays, for the whole scene and closer around the smallest target,
-//! with targets outlined. Colours show the density of starts relative to that by power, on a logarithmic scale. Without a
-//! directional light: the unit square of directions towards the target that most paths of the first source are aimed at, relative
-//! to a uniform density. The strip below shows the colours from the least to the largest density, which are printed.
+//! Draws the learned distribution of the starts of a light source's photon paths: `cargo run --release --example draw_aim --
+//! SCENE.gltf OUT.png [ITERATIONS]` For a directional light: starts on the plane across its rays, for the whole scene and for the
+//! surroundings of the smallest target, with outlined targets. Colours show the density of starts relative to sampling by power,
+//! on a logarithmic scale. Without a directional light: the unit square of directions towards the target of most paths of the
+//! first source, relative to a uniform density. The strip below shows the colours from the smallest to the largest density, which
+//! are printed.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -25,7 +25,7 @@ use ppm_vk::internals::scene::Scene;
 const SIDE: usize = 256;
 /// Pixels between panels.
 const GAP: usize = 4;
-/// Colours from the least density to the largest.
+/// Colours from the smallest density to the largest.
 const COLOURS: [[f64; 3]; 5] = [
     [10.0, 8.0, 40.0],
     [80.0, 20.0, 110.0],
@@ -159,7 +159,7 @@ fn panel(density: impl Fn(DVec2) -> f64) -> Panel {
         .collect()
 }
 
-/// The numbers for which `disc_point` of `glsl/common/sampling.glsl` gives this point of the unit disc.
+/// The inverse of `disc_point` in `glsl/common/sampling.glsl`.
 fn square_point(p: DVec2) -> DVec2 {
     let wide = p.x.abs() > p.y.abs();
     let q = if wide { p } else { p.yx() };
@@ -169,7 +169,7 @@ fn square_point(p: DVec2) -> DVec2 {
     square.clamp(DVec2::ZERO, DVec2::splat(1.0 - 1e-9))
 }
 
-/// Panels side by side, with the strip of colours below.
+/// Panels side by side, with the colour scale below.
 fn draw(panels: &[Panel], out: &Path) -> Result<()> {
     let densities = panels.iter().flatten().filter(|&&density| density > 0.0);
     let (low, high) = densities.fold((f64::INFINITY, 0.0f64), |(low, high), &d| (low.min(d), high.max(d)));

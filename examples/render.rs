@@ -1,5 +1,5 @@
-//! Renders a glTF file with the library: `cargo run --release --example render -- SCENE.gltf OUT.exr` It shows progress, and ends
-//! when the estimated error of the picture is 5 %, or after a minute.
+//! Renders a glTF file with the library: `cargo run --release --example render -- SCENE.gltf OUT.exr`. It shows progress, and
+//! ends when the estimated error of the picture is 5 %, or after a minute.
 
 use std::path::Path;
 use std::time::Duration;

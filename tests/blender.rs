@@ -1,7 +1,7 @@
-//! Files as Blender writes them, and pictures as it reads them.
+//! Files written by Blender, and pictures as Blender reads them.
 //!
-//! `../shared/assets/blender` has files by Blender 5.3, whose calibration scenes are a floor of albedo ½ that one lamp lights from
-//! 2 m above, or along: 100 W of a point or spot, 3 W/m² of a sun. Where the folder isn't there, those tests say so.
+//! `../shared/assets/blender` has files by Blender 5.3. Its calibration scenes are a floor of albedo ½ with one lamp, 2 m above
+//! it or a sun: 100 W for point and spot lights, 3 W/m² for the sun. The tests report it when the folder is missing.
 
 #[path = "program/mod.rs"]
 mod program;
@@ -14,7 +14,7 @@ use ppm_vk::internals::film::{Image, read_exr};
 use program::{ppm_vk, stderr};
 use tempfile::TempDir;
 
-/// A file of Blender's, where they are.
+/// A file written by Blender, if the folder exists.
 fn by_blender(name: &str) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/blender");
     let path = folder.join(name);
@@ -25,7 +25,7 @@ fn by_blender(name: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// A small picture of a scene, and what was said.
+/// A small picture of a scene, and the program's messages.
 fn render(folder: &Path, scene: &Path, more: &[&str]) -> (Image, String) {
     let scene = scene.to_str().expect("UTF-8");
     let mut arguments = vec!["--scene", scene, "-o", "out.exr", "--resolution", "9x9", "--quiet"];
@@ -36,7 +36,7 @@ fn render(folder: &Path, scene: &Path, more: &[&str]) -> (Image, String) {
     (read_exr(&folder.join("out.exr")).expect("a picture"), stderr(&output))
 }
 
-/// Right under the lamp: the radiance of a floor of albedo ½ is half of the irradiance over π.
+/// Directly below the lamp: the radiance of a floor of albedo ½ is half of the irradiance over π.
 #[test]
 fn lamps_are_as_bright_as_blender_has_them_in_the_units_that_flags_cover() {
     let folder = TempDir::new().expect("folder");
@@ -70,9 +70,9 @@ fn lamps_are_as_bright_as_blender_has_them_in_the_units_that_flags_cover() {
     }
 }
 
-/// A sun has no 4π in «Raw», and what emits has one unit in all.
+/// In «Raw» units a sun has no factor of 4π, and emissive surfaces have the same unit in all modes.
 #[test]
-fn suns_in_raw_units_and_what_emits_need_no_division() {
+fn suns_in_raw_units_and_emissive_surfaces_need_no_division() {
     let folder = TempDir::new().expect("folder");
     let (Some(sun), Some(emitting)) = (by_blender("calib-sun-RAW.glb"), by_blender("calib-emis-SPEC.glb")) else {
         return;
@@ -117,7 +117,7 @@ fn half_a_wall(folder: &Path) -> PathBuf {
     path
 }
 
-/// Channel A of a picture.
+/// The alpha channel of a picture.
 fn alpha(path: &Path) -> Vec<f32> {
     let file = exr::prelude::read_first_flat_layer_from_file(path).expect("a picture");
     let channels = &file.layer_data.channel_data.list;
@@ -128,7 +128,7 @@ fn alpha(path: &Path) -> Vec<f32> {
     alpha.sample_data.values_as_f32().collect()
 }
 
-/// A middle column is half a wall; an environment is no surface.
+/// The middle column is half covered by a wall; an environment is not a surface.
 #[test]
 fn alpha_is_the_share_of_the_camera_paths_that_met_a_surface() {
     let folder = TempDir::new().expect("folder");
@@ -155,7 +155,7 @@ fn alpha_is_the_share_of_the_camera_paths_that_met_a_surface() {
     }
 }
 
-/// Runs Python on a program with arguments; `None` where that or a module isn't there, which is said.
+/// Runs Python code with arguments; `None`, with a message, if Python or a module is missing.
 fn python(module: &str, program: &str, argument: &Path) -> Option<String> {
     let interpreter = std::env::var("PPM_VK_TEST_PYTHON").unwrap_or_else(|_| "python3".into());
     let runs = |text: &str| {
@@ -176,7 +176,7 @@ fn python(module: &str, program: &str, argument: &Path) -> Option<String> {
     Some(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// The numbers after a word that begins a line.
+/// The numbers after the first word of a line.
 fn numbers(text: &str, word: &str) -> Vec<f32> {
     let line = text.lines().find_map(|line| line.strip_prefix(word));
     let line = line.unwrap_or_else(|| panic!("no line {word}: {text}"));
@@ -185,7 +185,7 @@ fn numbers(text: &str, word: &str) -> Vec<f32> {
         .collect()
 }
 
-/// Colours and alpha of the second pixel from the left and the one right of the middle, in the top row.
+/// RGBA of the second pixel from the left and the pixel right of the middle, in the top row.
 fn expected(folder: &Path) -> Vec<f32> {
     let image = read_exr(&folder.join("out.exr")).expect("a picture");
     let alpha = alpha(&folder.join("out.exr"));
@@ -212,7 +212,7 @@ print("pixels", *[channels[name].pixels[0][x] for x in (1, 5) for name in "RGBA"
     assert_eq!(numbers(&text, "pixels"), expected(folder.path()));
 }
 
-/// As an image, and as what an external engine brings; the latter takes plain channels from Blender 5.3 on.
+/// As an image, and as the result of an external render engine; since Blender 5.3 the latter accepts plain channels.
 #[test]
 fn blender_reads_the_picture() {
     let folder = TempDir::new().expect("folder");
@@ -282,7 +282,7 @@ fn values_that_mean_nothing_are_refused_by_the_name_of_their_flag() {
     }
 }
 
-/// Also of the light that a scene without any is given. Where nothing surrounds a scene, one line says that flags do nothing.
+/// Also for a scene's default light. For a scene without any, one line says that the flags have no effect.
 #[test]
 fn an_environment_is_scaled_and_rotated_where_there_is_one() {
     let folder = TempDir::new().expect("folder");
@@ -313,7 +313,7 @@ fn an_environment_is_scaled_and_rotated_where_there_is_one() {
         (&flags[2..], "note: --environment-strength is without effect"),
     ] {
         let (image, said) = picture(&lamp, flags);
-        assert!(image == plain, "{flags:?}: other bits");
+        assert!(image == plain, "{flags:?}: the pictures differ");
         assert!(without_effect(&said) == 1 && said.contains(words), "{flags:?}: {said}");
     }
 }

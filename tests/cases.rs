@@ -1,5 +1,5 @@
-//! The files of `../shared/cases`, small inputs after public bug reports, as the `expected.txt` of each folder says. Where that leaves
-//! a choice, `docs/files.md` has it. Where the folder isn't there, the tests say so.
+//! The files of `../shared/cases`: small inputs after public bug reports, with the results of each folder's `expected.txt`. Where
+//! it allows several, `docs/files.md` says which. The tests report it when the folder is missing.
 
 #[path = "cases/files.rs"]
 mod files;

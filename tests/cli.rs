@@ -1,4 +1,4 @@
-//! What scripts rely on: exit codes, one line for an error, files that are whole or absent.
+//! Behaviour that scripts rely on: exit codes, one line for an error, output files that are complete or absent.
 
 #[path = "program/mod.rs"]
 mod program;
@@ -36,7 +36,7 @@ fn files(folder: &Path) -> Vec<String> {
         .collect()
 }
 
-/// The work failed: exit code 1, one line that has these words, no panic, no file.
+/// The run failed: exit code 1, one line that contains these words, no panic, no output file.
 fn assert_fails(folder: &TempDir, output: &Output, words: &[&str]) {
     let text = stderr(output);
     let errors: Vec<&str> = text.lines().filter(|line| line.starts_with("error: ")).collect();
@@ -53,7 +53,7 @@ fn assert_fails(folder: &TempDir, output: &Output, words: &[&str]) {
     assert!(left.is_empty(), "left behind: {left:?}");
 }
 
-/// The arguments are wrong: exit code 2, and the flag is named.
+/// The arguments are invalid: exit code 2, and the message names the flag.
 fn assert_refused(output: &Output, flag: &str) {
     let text = stderr(output);
     assert_eq!(output.status.code(), Some(2), "exit code for {flag}; stderr: {text}");
@@ -254,7 +254,7 @@ fn arguments_out_of_range_are_refused() {
 }
 
 #[test]
-fn refusals_say_what_a_number_must_be() {
+fn refusals_name_the_valid_range_of_a_number() {
     let folder = TempDir::new().expect("folder");
     let scene = scene("cornell.gltf");
     let scene = scene.to_str().expect("UTF-8");
@@ -273,7 +273,7 @@ fn refusals_say_what_a_number_must_be() {
         );
         assert!(!text.contains("00000000"), "{arguments:?}: {text}");
     }
-    // Farther than any number that the device has, but what is meant is clear.
+    // Beyond the range of the device's numbers, but the meaning is clear.
     let output = small_render(
         folder.path(),
         Path::new(scene),
@@ -368,7 +368,7 @@ fn outputs_overwrite_neither_each_other_nor_the_scene() {
         std::fs::create_dir_all(folder.path().join("d")).expect("a folder");
         let more = ["--trace", trace, "--profile-json", profile];
         let output = small_render(folder.path(), &copy, &more);
-        // The name alone says that some hold something else.
+        // The name alone shows that some of them contain something else.
         let text = stderr(&output);
         assert!(
             matches!(output.status.code(), Some(1 | 2))
@@ -387,9 +387,9 @@ fn outputs_overwrite_neither_each_other_nor_the_scene() {
     assert!(folder.path().join("a.b.exr").exists(), "{:?}", files(folder.path()));
 }
 
-/// A scene whose buffer and texture have names of outputs, so that the names alone don't protect them.
+/// A scene whose buffer and texture are named like outputs, so that the names alone do not protect them.
 #[test]
-fn what_the_scene_refers_to_is_not_overwritten() {
+fn files_of_the_scene_are_not_overwritten() {
     let folder = TempDir::new().expect("folder");
     let text = std::fs::read_to_string(scene("cornell.gltf")).expect("scene");
     let mut json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
@@ -451,7 +451,7 @@ fn an_output_that_cannot_be_written_does_not_stop_the_others() {
     let folder = TempDir::new().expect("folder");
     let scene = scene("cornell.gltf");
     let scene = scene.to_str().expect("UTF-8");
-    // No file may be longer than 16 blocks, which are 512 or 1,024 bytes, as the shell has it.
+    // Limits files to 16 blocks of 512 or 1,024 bytes, depending on the shell.
     let script = format!(
         "ulimit -f 16; exec '{}' --scene '{scene}' --resolution 64x64 --iterations 4 --photons 1000 -o o.exr --png p.png \
          --profile-json p.json --trace t.json",
@@ -487,7 +487,7 @@ fn long_render(folder: &Path, more: &[&str]) -> std::process::Child {
     // The radius is printed when the iterations begin.
     let mut stderr = std::io::BufReader::new(child.stderr.take().expect("stderr"));
     std::io::BufRead::read_line(&mut stderr, &mut String::new()).expect("a line");
-    // What is said later has a reader as long as the program runs.
+    // Keeps reading messages while the program runs.
     std::thread::spawn(move || std::io::copy(&mut stderr, &mut std::io::sink()));
     child
 }
@@ -525,7 +525,7 @@ fn an_iteration_that_is_too_long_is_cut_by_the_time_and_by_ctrl_c() {
         assert_eq!(status.code(), Some(0), "{backend}");
         let picture = ppm_vk::internals::film::read_exr(&folder.path().join("o.exr")).expect("the picture is whole");
         let mean = ppm_vk::internals::metrics::mean(&picture)[1];
-        // Of the whole picture, whatever is seen in so few pixels.
+        // Relative to the whole picture, although few pixels are affected.
         assert!(
             (0.2..0.8).contains(&mean),
             "{backend}: the photons aren't divided by those emitted: {mean}"
@@ -540,7 +540,7 @@ fn an_iteration_that_is_too_long_is_cut_by_the_time_and_by_ctrl_c() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn signals_that_the_program_is_told_to_ignore_stay_ignored() {
+fn signals_that_were_ignored_at_the_start_stay_ignored() {
     let folder = TempDir::new().expect("folder");
     let scene = scene("cornell.gltf");
     let scene = scene.to_str().expect("UTF-8");
@@ -617,7 +617,7 @@ fn the_processor_renders_without_vulkan() {
 }
 
 #[test]
-fn unknown_cameras_and_devices_are_named_with_what_there_is() {
+fn unknown_cameras_and_devices_are_named_with_the_available_ones() {
     let folder = TempDir::new().expect("folder");
     let scene = scene("cornell.gltf");
     assert_fails(
@@ -634,11 +634,11 @@ fn unknown_cameras_and_devices_are_named_with_what_there_is() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_machine_without_vulkan_is_told_what_to_install() {
+fn without_vulkan_the_error_names_the_packages_to_install() {
     let folder = TempDir::new().expect("folder");
     let scene = scene("cornell.gltf");
     let arguments = ["--scene", scene.to_str().expect("UTF-8"), "--resolution", "16x16"];
-    // A loader that is no library, found before the real one.
+    // A file named like the Vulkan loader, but not a library, is found before the real one.
     let libraries = TempDir::new().expect("folder");
     std::fs::write(libraries.path().join("libvulkan.so.1"), b"").expect("file");
     std::fs::write(libraries.path().join("libvulkan.so"), b"").expect("file");
@@ -691,7 +691,7 @@ fn lists_go_to_stdout() {
     }
 }
 
-/// A file of two scenes, hall and attic, and two variants of a plate that glows, in a folder.
+/// A file with two scenes, hall and attic, and two variants of an emissive plate, in a folder.
 fn write_choices(folder: &Path) -> PathBuf {
     let file = folder.join("choices.gltf");
     let corners: [f32; 9] = [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0];
@@ -819,7 +819,7 @@ fn environments_that_cannot_be_read_are_one_line() {
 #[test]
 fn an_environment_takes_no_more_memory_than_the_scene_may() {
     let folder = TempDir::new().expect("folder");
-    // A few bytes that claim to be 134 million pixels.
+    // A few bytes that claim to be an image of 134 million pixels.
     std::fs::write(
         folder.path().join("sky.hdr"),
         "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n",

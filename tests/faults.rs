@@ -1,4 +1,4 @@
-//! Faults as they happen, of inputs and of files in the way: each was there once.
+//! Regression tests for faults in inputs and files.
 
 #[path = "program/mod.rs"]
 mod program;
@@ -15,7 +15,7 @@ fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")
 }
 
-/// The box with one thing changed, in a folder.
+/// The box with one change, in a folder.
 fn changed_box(folder: &Path, change: impl FnOnce(&mut Value)) -> PathBuf {
     let text = std::fs::read_to_string(scenes().join("cornell.gltf")).expect("the scene");
     let mut scene: Value = serde_json::from_str(&text).expect("JSON");
@@ -26,7 +26,7 @@ fn changed_box(folder: &Path, change: impl FnOnce(&mut Value)) -> PathBuf {
     path
 }
 
-/// Renders a scene to `o.exr`; returns the lines that were said.
+/// Renders a scene to `o.exr`; returns the messages.
 fn render(folder: &Path, scene: &Path, more: &[&str]) -> Vec<String> {
     let scene = scene.to_str().expect("UTF-8");
     let arguments = ["--scene", scene, "-o", "o.exr", "--quiet", "--resolution", "16x16"];
@@ -40,7 +40,7 @@ fn warnings(said: &[String]) -> Vec<&String> {
     said.iter().filter(|line| line.starts_with("warning: ")).collect()
 }
 
-/// Also where a path or two are so long that they are cut.
+/// Also if one or two paths are so long that they are shortened.
 #[test]
 fn scenes_that_are_fine_give_no_warning() {
     let folder = TempDir::new().expect("folder");
@@ -61,7 +61,7 @@ fn scenes_that_are_fine_give_no_warning() {
 }
 
 #[test]
-fn a_warning_of_missing_light_says_how_much_and_what_to_do() {
+fn a_warning_of_missing_light_names_the_amount_and_a_remedy() {
     let folder = TempDir::new().expect("folder");
     let settings = [
         "--iterations",
@@ -79,13 +79,13 @@ fn a_warning_of_missing_light_says_how_much_and_what_to_do() {
     let words = warnings[0].split(' ').collect::<Vec<_>>();
     let percent = words.iter().position(|word| *word == "%").expect("a share");
     let share: f64 = words[percent - 1].parse().expect("a share");
-    // Light goes into the water, down, up and out again: more than a few hundredths of it take more than three bounces.
+    // Light enters the water, goes down, up and out again: more than a few percent of it takes more than three bounces.
     assert!((5.0..100.0).contains(&share), "{said:#?}");
     assert!(warnings[0].contains("raise --max-depth"), "{said:#?}");
 }
 
 #[test]
-fn a_black_picture_is_told_of() {
+fn a_black_picture_is_reported() {
     let folder = TempDir::new().expect("folder");
     let scene = changed_box(folder.path(), |scene| {
         for material in scene["materials"].as_array_mut().expect("materials") {
@@ -95,7 +95,7 @@ fn a_black_picture_is_told_of() {
         }
         scene["extensionsUsed"] = json!(["KHR_lights_punctual"]);
         scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "spot", "spot": {}}]}});
-        // In front of the room, it shines away from it.
+        // In front of the room, facing away from it.
         let turned_round = json!({
             "translation": [0, 1, 20], "rotation": [0, 1, 0, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}
         });
@@ -118,7 +118,7 @@ fn a_black_picture_is_told_of() {
     }
 }
 
-/// Of light that f32 hardly holds.
+/// A light near the limits of f32.
 #[test]
 fn no_picture_has_values_that_are_no_numbers() {
     let folder = TempDir::new().expect("folder");
@@ -136,7 +136,7 @@ fn no_picture_has_values_that_are_no_numbers() {
         let image = read_exr(&folder.path().join("o.exr")).expect("a picture");
         assert_eq!(defects(&image), Defects::default(), "{backend}: {said:#?}");
         let warnings = warnings(&said);
-        // In f64 sums reach farther than the picture's numbers, which hold all of this one.
+        // Sums in f64 have a larger range than the picture's numbers, which can represent this one.
         assert!(
             (warnings.is_empty() && backend == "cpu")
                 || warnings.len() == 1
@@ -147,7 +147,7 @@ fn no_picture_has_values_that_are_no_numbers() {
     }
 }
 
-/// Whoever reads a pipe that nobody writes to waits for ever.
+/// Reading from a pipe without a writer would wait for ever.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_pipe_in_the_place_of_a_cache_is_not_waited_for() {
@@ -185,7 +185,7 @@ fn a_pipe_in_the_place_of_a_cache_is_not_waited_for() {
         }
         if begin.elapsed() > Duration::from_secs(60) {
             again.kill().expect("killed");
-            panic!("it waits for what nobody writes");
+            panic!("it waits for a writer");
         }
         std::thread::sleep(Duration::from_millis(20));
     };

@@ -1,4 +1,4 @@
-//! Kernels fit a GPU, as far as a compiler can tell: Mesa's RADV compiles them for a card that isn't there.
+//! Kernels fit a GPU, according to a compiler: Mesa's RADV compiles them for a card that need not be present.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,7 +13,7 @@ const DRIVERS: [&str; 2] = [
     "/usr/share/vulkan/icd.d/radeon_icd.json",
 ];
 
-/// What the compiler says of each kernel; `None`, with a line that says so, where RADV isn't there.
+/// The compiler's statistics of each kernel; `None`, with a message, without RADV.
 fn compiled(features: &str) -> Option<Vec<Value>> {
     let Some(driver) = DRIVERS.into_iter().find(|driver| Path::new(driver).exists()) else {
         println!("skipped: no RADV on this machine (Debian: mesa-vulkan-drivers)");
@@ -43,8 +43,8 @@ fn figure(kernel: &Value, name: &str) -> u64 {
         .unwrap_or_else(|| panic!("{name} of {kernel}")) as u64
 }
 
-/// Asserts that no kernel spills registers, and that enough subgroups of each fit a SIMD at once: memory's latency is hidden by as
-/// many. Where the device traces rays itself, its driver's traversal is a part of the kernel.
+/// Asserts that no kernel spills registers, and that enough subgroups of each fit a SIMD at once to hide the latency of memory.
+/// With ray queries, the driver's traversal is a part of the kernel.
 fn assert_fit(features: &str, least: u64, least_by_query: u64) {
     let Some(kernels) = compiled(features) else { return };
     assert!(kernels.len() > 30, "{features}: {} kernels", kernels.len());
@@ -76,7 +76,7 @@ fn kernels_of_usual_scenes_fit_twelve_times() {
     assert_fit("mirrors,dielectrics,glossy,textured", 12, 8);
 }
 
-/// No scene has everything.
+/// No scene uses all features.
 #[test]
 fn kernels_that_know_everything_fit_eight_times() {
     assert_fit("all", 8, 6);

@@ -1,5 +1,5 @@
-//! Files that are damaged, or put together wrongly, load or give one line, but nothing worse: no panic, no hang, no memory beyond
-//! a bound. Each is made from a number, so that any that fails can be made again.
+//! Damaged or inconsistent files load, or fail with one line. There must be no panic, no hang, and no memory use beyond a bound.
+//! Each file is generated from a number, so that a failure can be reproduced.
 
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 mod allocations;
 #[path = "fuzz/damage.rs"]
 mod damage;
-// These serve the tests of the loader too.
+// The loader's tests use these too.
 #[allow(dead_code)]
 #[path = "scene/encoded.rs"]
 mod encoded;
@@ -27,7 +27,8 @@ use survival::{Outcome, Watch};
 /// One run at a time: memory is counted for the whole process.
 static RUNS: Mutex<()> = Mutex::new(());
 
-/// Damages the originals by turns with the numbers from `first` on until `is_enough` of how many were done and for how long.
+/// Damages the originals in turn, with consecutive numbers from `first` until `is_enough`, which gets the count and the elapsed
+/// time.
 fn survive(first: u64, is_enough: impl Fn(u64, Duration) -> bool) {
     let _alone = RUNS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let originals = originals::all();
@@ -56,7 +57,7 @@ fn survive(first: u64, is_enough: impl Fn(u64, Duration) -> bool) {
         let all = loaded + refused;
         assert!(
             all < 100 || (*loaded > all / 50 && *refused > all / 50),
-            "{}: {loaded} of {all} load: it is damaged too much or too little",
+            "{}: {loaded} of {all} load: too much or too little damage",
             original.name()
         );
     }

@@ -1,5 +1,5 @@
-//! Barriers of recorded commands, checked without a device by an argument of their own: between two commands that touch
-//! the same buffer, one of them writing, there is a barrier.
+//! Barriers of recorded commands, checked independently and without a device: between two commands that touch the same buffer,
+//! and at least one of which writes it, there must be a barrier.
 
 use ppm_vk::internals::config::RenderConfig;
 use ppm_vk::internals::gather::METHODS;

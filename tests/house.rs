@@ -1,4 +1,4 @@
-//! The rules of the house that a machine can check: who may import what, and where Vulkan and `unsafe` live.
+//! Structure rules: which module may import which, and where Vulkan and `unsafe` are allowed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -58,7 +58,7 @@ fn vulkan_and_unsafe_live_in_gpu_alone() {
 fn imports_go_downward() {
     const SCENES: &[&str] = &["scene", "loader", "packing"];
     const RENDERERS: &[&str] = &["gpu", "pipeline", "session", "cpu"];
-    // Who must not know whom.
+    // The modules that a layer must not import.
     let forbidden: &[(&str, &[&[&str]])] = &[
         ("layout", &[&[""]]),
         ("alias.rs", &[&[""]]),
@@ -142,8 +142,8 @@ fn kernels_know_no_lobe_and_no_kind_of_light() {
     }
 }
 
-/// Compilers inline functions. What a function with several returns gives, or a variable that some ways leave unset, is then carried
-/// through all iterations of the kernel's loop, in registers: 33 in `photons` before.
+/// Compilers inline functions. The result of a function with several returns, and a variable that is not always set, stay in
+/// registers through all iterations of the kernel's loop: 33 registers in `photons`.
 #[test]
 fn functions_that_kernels_call_in_loops_return_once() {
     for (file, text) in ["bsdf", "lights", "trace"].into_iter().flat_map(glsl) {
@@ -161,7 +161,7 @@ fn functions_that_kernels_call_in_loops_return_once() {
 const OF_THE_PROGRAM: [&str; 6] = ["anyhow", "clap", "ctrlc", "indicatif", "plotters", "signal-hook"];
 
 #[test]
-fn the_library_builds_without_what_only_the_program_needs() {
+fn the_library_builds_without_the_programs_dependencies() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let manifest = fs::read_to_string(root.join("Cargo.toml")).expect("Cargo.toml");
     let dependencies = manifest
@@ -199,7 +199,7 @@ fn the_library_builds_without_what_only_the_program_needs() {
         let is_there = tree.lines().any(|line| line.starts_with(&format!("{name} v")));
         assert!(
             !is_there,
-            "a dependency of the library brings {name}: cargo tree --no-default-features -i {name}"
+            "a dependency of the library depends on {name}: cargo tree --no-default-features -i {name}"
         );
     }
 }
@@ -247,15 +247,15 @@ fn every_stage_is_documented_where_it_is_written() {
         let comment = text.lines().find(|line| !line.starts_with('#')).unwrap_or("");
         assert!(
             comment.starts_with("// "),
-            "{} doesn't say first what it does",
+            "{} does not start with a description",
             path.display()
         );
-        // Before it gl_WorkGroupSize is (1, 1, 1), and shared arrays that are sized by it are too small.
+        // Before this line gl_WorkGroupSize is (1, 1, 1), and shared arrays sized by it are too small.
         let size = text.find("layout(local_size_x").expect("a workgroup size");
         let include = text.find("#include").unwrap_or(text.len());
         assert!(
             size < include,
-            "{} includes files before it says its workgroup's size",
+            "{} includes files before it declares its workgroup size",
             path.display()
         );
     }

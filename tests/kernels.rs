@@ -1,5 +1,5 @@
-//! The kernels against the CPU's functions (`src/cpu`), on the best Vulkan device of the machine. In debug builds a message
-//! of the validation layer fails a test as well.
+//! The kernels compared with the CPU's functions (`src/cpu`), on the machine's best Vulkan device. In debug builds, a message of
+//! the validation layer also fails a test.
 
 #[path = "kernels/agreement.rs"]
 mod agreement;

@@ -1,4 +1,4 @@
-//! Host and shaders agree on every struct that they share.
+//! Host and shaders agree on all shared structs.
 
 use std::collections::BTreeSet;
 
@@ -43,7 +43,7 @@ fn every_block_of_structs_has_a_rust_struct() {
         for binding in shader.bindings {
             // Blocks of plain numbers are named like their buffer, structs otherwise.
             let name = binding.element.name;
-            // A probe's lists are a test's own.
+            // The lists of probes are declared by tests.
             let is_probed = [BufferId::ProbeFrom, BufferId::ProbeTo].contains(&binding.buffer);
             let is_buffer = name == format!("{:?}", binding.buffer) && binding.access != Access::Uniform;
             let known = layouts().any(|rust| rust.name == name);

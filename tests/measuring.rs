@@ -249,7 +249,7 @@ fn a_render_stops_at_the_target_error_and_writes_its_estimate() {
 }
 
 #[test]
-fn no_measurement_overwrites_what_it_reads() {
+fn no_measurement_overwrites_its_inputs() {
     let folder = TempDir::new().expect("folder");
     let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/references/cornell.exr");
     let copy = folder.path().join("r");

@@ -1,6 +1,6 @@
-//! The memory that `ppm-vk inspect` foretells is what a render takes.
+//! A render uses the memory that `ppm-vk inspect` predicts.
 
-// Each test program uses a part of what they share.
+// Each test program uses a part of the shared module.
 #[allow(dead_code)]
 #[path = "scene/fixture.rs"]
 mod fixture;
@@ -21,7 +21,7 @@ use fixture::Fixture;
 use picture::{Subject, small};
 
 #[test]
-fn a_render_takes_the_memory_that_was_foretold() {
+fn a_render_takes_the_predicted_memory() {
     let device = best_device().expect("a Vulkan device");
     for (name, estimator) in [
         ("cornell", Estimator::Sppm),
@@ -43,7 +43,7 @@ fn a_render_takes_the_memory_that_was_foretold() {
         }
         let later = renderer.gpu().bytes();
         let total = foretold.scene + foretold.render;
-        println!("{name}: foretold {total}, at first {at_first}, later {later}");
+        println!("{name}: predicted {total}, at first {at_first}, later {later}");
         let ratio = at_first as f64 / total as f64;
         assert!(
             (0.9..=1.1).contains(&ratio),
@@ -53,7 +53,7 @@ fn a_render_takes_the_memory_that_was_foretold() {
     }
 }
 
-/// The room and so many nodes that show one mesh of 10,082 triangles.
+/// The room with this number of nodes that show one mesh of 10,082 triangles.
 fn with_nodes(count: u32) -> Subject {
     const SIDE: u16 = 71;
     let mut room = Fixture::room();
@@ -88,13 +88,13 @@ fn a_thousand_instances_of_a_mesh_take_hardly_more_memory_than_one_node() {
     assert_eq!((one.packed.instances.len(), thousand.packed.instances.len()), (0, 1000));
     assert_eq!(thousand.packed.seen_triangles(), 3 + 1000 * 10_082);
     assert!(4 * bytes(&thousand) < 5 * bytes(&one));
-    // And of the host.
+    // And on the host.
     assert_eq!(thousand.scene.positions.len(), one.scene.positions.len());
 }
 
-/// lavapipe binds 128 MiB. Pictures of the default width, and larger ones, fit however much a scene asks of its visible points.
+/// lavapipe binds at most 128 MiB. Pictures of the default width and larger fit, whatever a scene needs for its visible points.
 #[test]
-fn pictures_of_usual_sizes_fit_what_a_small_device_binds() {
+fn pictures_of_usual_sizes_fit_the_bindings_of_a_small_device() {
     const BINDABLE: u64 = 128 << 20;
     let limits = Limits {
         storage_buffer_bytes: BINDABLE,

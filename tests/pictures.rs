@@ -1,5 +1,4 @@
-//! Whole pictures against each other, pixel by pixel, and against references. How bright pictures have to be, `right.rs`
-//! tells.
+//! Pictures compared with each other pixel by pixel, and with references. `right.rs` tests their absolute brightness.
 
 #[path = "picture/mod.rs"]
 mod picture;
@@ -28,7 +27,7 @@ fn assert_matches_reference(name: &str, direct: Direct, iterations: u32, rel_mse
     );
 }
 
-/// Kernels that know every feature, or those that a scene has: a matter of speed alone.
+/// Kernels with all features, or specialised for a scene: only speed differs.
 #[test]
 fn all_features_compiled_in_give_the_same_picture() {
     for name in ["cornell", "cornell-spheres", "glasses", "textures"] {
@@ -36,7 +35,7 @@ fn all_features_compiled_in_give_the_same_picture() {
         let own = subject.render(4, small(64, 20_000));
         let own_features = subject.packed.features;
         subject.packed.features = SceneFeatures {
-            // Ways to choose lights, of which a scene has one.
+            // Ways to choose light sources, of which a scene uses one.
             few_sources: own_features.few_sources,
             many_sources: own_features.many_sources,
             ..SceneFeatures::ALL
@@ -58,7 +57,7 @@ fn mirrors_and_glass_vanish_in_a_uniform_environment() {
         .count();
     assert!(
         off <= 64 * 64 / 100,
-        "{off} of 4,096 pixels aren't 1 (a few at silhouettes may)"
+        "{off} of 4,096 pixels differ from 1 (a few at silhouettes may)"
     );
 }
 
@@ -135,14 +134,14 @@ fn photons_that_do_not_fit_make_room_and_lose_nothing() {
     let mut renderer = furnace.renderer(config.clone());
     (0..ITERATIONS).for_each(|_| drop(renderer.iterate().expect("iteration")));
     let (counters, image) = (renderer.counters(), renderer.resolve().expect("picture"));
-    // One path a lane: the lanes' room for an average path doesn't hold the longest.
+    // One path per lane: a lane's capacity for an average path is too small for the longest.
     assert!(
         counters.repeated_iterations > 0,
         "the buffer was never too small: this test shows nothing"
     );
-    // The walls shine to both sides: half of the paths escape, and of the others a fifth ends at each meeting with a wall. So there are
-    // 2.5 photons a path, with a standard deviation of √(45/2 − 2.5²). Six of the sum's fail a right program once in 5·10⁸ times; a
-    // lane's room, a quarter more than the mean, holds half of them.
+    // The walls emit to both sides: half of the paths escape, and a fifth of the others ends at each bounce. So there are 2.5
+    // photons per path, with a standard deviation of √(45/2 − 2.5²). Six standard deviations of the sum: a correct program fails
+    // once in 5·10⁸ runs. A lane's capacity, a quarter more than the mean, holds half of them.
     let paths = f64::from(PATHS * ITERATIONS);
     let deviation = (16.25 * paths).sqrt();
     let (stored, expected) = (counters.photons_stored as f64, 2.5 * paths);
@@ -159,6 +158,6 @@ fn debug_builds_run_under_the_validation_layer() {
     let device = Device::open(None).expect("a Vulkan device");
     assert!(
         device.is_validated() || !cfg!(debug_assertions),
-        "VK_LAYER_KHRONOS_validation isn't installed: these tests would miss what it says (scripts/setup installs it)"
+        "VK_LAYER_KHRONOS_validation is not installed: these tests would miss its messages (scripts/setup installs it)"
     );
 }

@@ -1,8 +1,8 @@
-//! Answers that are known without this program: closed forms, conservation, theory, other renderers' pictures.
+//! Answers known independently of this program: closed forms, conservation, theory, and pictures of other renderers.
 //!
-//! A tolerance is made of two parts. The statistical one is a number of standard errors, each measured in the test itself
-//! from independent samples, so many that a right program fails a comparison with a probability of 1e-8 or less. The
-//! other bounds the known bias by the photons' radius, from the geometry; each test says how. Seeds are fixed.
+//! A tolerance has two parts. The statistical part is a number of standard errors, measured in the test from independent samples,
+//! so that a correct program fails a comparison with a probability of 1e-8 or less. The other part bounds the known bias of the
+//! photon radius, from the geometry; each test says how. Seeds are fixed.
 
 #[path = "right/aimed.rs"]
 mod aimed;

@@ -1,4 +1,4 @@
-//! The scene loader: what it makes of good files, and that every bad one gives one clear line.
+//! The scene loader: the results of valid files, and one clear line for each invalid one.
 
 #[path = "scene/accessors.rs"]
 mod accessors;

@@ -12,7 +12,7 @@ fn folder() -> PathBuf {
 }
 
 #[test]
-fn the_committed_scenes_are_what_the_generator_writes() {
+fn the_committed_scenes_are_those_of_the_generator() {
     let files = scenes::all();
     for file in &files {
         let committed = fs::read(folder().join(&file.name)).unwrap_or_default();

@@ -1,9 +1,9 @@
-//! Hard cases: scenes, settings and numbers at the edge of what a renderer can be given, each with a measure that shows
-//! that the picture is right there. docs/accuracy.md lists them, and what happens without the guard of each.
+//! Hard cases: extreme scenes, settings and numbers, each with a measure that shows that the picture is correct. docs/accuracy.md
+//! lists them, and the results without the measure against each.
 //!
 //! Every picture and buffer of every case is searched for NaN, infinity and negative values (`sound`).
 
-// Each test program uses a part of what they share.
+// Each test program uses a part of the shared module.
 #[allow(dead_code)]
 #[path = "kernels/bench.rs"]
 mod bench;

@@ -1,4 +1,4 @@
-//! Writes the project's own scenes: `cargo run --example make_scenes -- scenes`.
+//! Writes the scenes of this repository: `cargo run --example make_scenes -- scenes`.
 
 mod scenes;
 

@@ -9,11 +9,11 @@ use tempfile::TempDir;
 
 use super::program::{ppm_vk, stderr};
 
-/// The folder of the case of this number, where it is there.
+/// The folder of the case with this number, if it exists.
 pub fn folder(number: &str) -> Option<PathBuf> {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/cases");
     let Ok(folders) = fs::read_dir(cases) else {
-        println!("skipped, for it isn't there: ../shared/cases");
+        println!("skipped: missing: ../shared/cases");
         return None;
     };
     let folders = folders.map(|folder| folder.expect("a folder").path());
@@ -24,7 +24,7 @@ pub fn folder(number: &str) -> Option<PathBuf> {
     Some(found)
 }
 
-/// The glTF files in a folder, in order; as many as are known to be there.
+/// The glTF files in a folder, sorted; their number is known.
 pub fn scenes(folder: &Path, count: usize) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).expect("a folder");
     let paths = entries.map(|entry| entry.expect("an entry").path());
@@ -35,7 +35,7 @@ pub fn scenes(folder: &Path, count: usize) -> Vec<PathBuf> {
     assert_eq!(
         scenes.len(),
         count,
-        "{}: other files than were looked at",
+        "{}: the files differ from the known ones",
         folder.display()
     );
     scenes
@@ -46,14 +46,14 @@ pub fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// A picture, and what was said.
+/// A picture, and the messages.
 pub struct Seen {
     pub image: Image,
     pub said: String,
     name: String,
 }
 
-/// Renders a scene; the picture has neither NaN, nor infinity, nor a negative value.
+/// Renders a scene. The picture has no NaN, infinity or negative value.
 pub fn render(scene: &Path, side: u32, iterations: u32, photons: u32, more: &[&str]) -> Seen {
     let folder = TempDir::new().expect("a folder");
     let [size, iterations, photons] = [format!("{side}x{side}"), iterations.to_string(), photons.to_string()];
@@ -77,7 +77,7 @@ pub fn render(scene: &Path, side: u32, iterations: u32, photons: u32, more: &[&s
     Seen { image, said, name }
 }
 
-/// The scene is refused: exit code 1, one line that begins with its name and has these words, and no file.
+/// The scene is refused: exit code 1, one line that begins with its name and contains these words, and no output file.
 pub fn assert_refused(scene: &Path, words: &str, more: &[&str]) {
     let folder = TempDir::new().expect("a folder");
     let arguments = ["--scene", scene.to_str().expect("UTF-8"), "-o", "out.exr", "--quiet"];
@@ -109,7 +109,7 @@ impl Seen {
         self.said.lines().filter(|line| line.starts_with("warning: ")).collect()
     }
 
-    /// Mean over the pixels at which a function of (x, y), from −1 to 1 over the picture, is true.
+    /// Mean over the pixels for which a function of (x, y), from −1 to 1 across the picture, is true.
     pub fn mean(&self, is_asked: impl Fn(f64, f64) -> bool) -> [f64; 3] {
         let (width, height) = (self.image.width(), self.image.height());
         let place = |index: usize, count: usize| (2.0 * index as f64 + 1.0) / count as f64 - 1.0;
@@ -125,7 +125,7 @@ impl Seen {
         sum.map(|sum| sum / count)
     }
 
-    /// All three channels of such a mean are what is expected.
+    /// All three channels of such a mean have the expected value.
     #[track_caller]
     pub fn assert_mean(&self, expected: f64, tolerance: f64, place: &str, is_asked: impl Fn(f64, f64) -> bool) {
         let mean = self.mean(is_asked);

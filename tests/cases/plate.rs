@@ -1,19 +1,19 @@
-//! Cases about the file itself: all show one matte plate of reflectance ½, by default in uniform light of radiance 1. What was read
-//! wrongly shows as another value.
+//! Cases about the file itself: each shows one matte plate of reflectance ½, by default in uniform light of radiance 1. A reading
+//! error changes the value.
 //!
-//! The plate that is meant, `plain`, is looked at for the value; all others with as many samples as are needed to tell one reading from
-//! another, beside `plain` with the same samples: direct light is proportional to what reflects it, so that no noise is left
-//! in the ratio.
+//! The intended plate, `plain`, is checked for its absolute value. All others are compared with `plain` with the same samples, as
+//! many as are needed to distinguish the possible readings: direct light is proportional to reflectance, so that the ratio has no
+//! noise.
 
 use std::path::Path;
 use std::sync::OnceLock;
 
 use super::files::{Seen, assert_refused, folder, name, render, scenes};
 
-/// Of rounding, and of the few samples that meet other places because a number in the file is rounded otherwise.
+/// For rounding, and for the few samples that hit other points because a number in the file is rounded differently.
 const TOLERANCE: f64 = 1e-3;
 
-/// As a file is looked at: the same samples for all. What renders it doesn't matter here, and the processor needs no pipelines.
+/// The same samples for all files. The renderer does not matter here, and the CPU needs no pipelines.
 fn look(scene: &Path, more: &[&str]) -> Seen {
     render(scene, 8, 4, 512, &[&["--backend", "cpu"], more].concat())
 }
@@ -23,7 +23,7 @@ fn look_in_white(scene: &Path) -> Seen {
     look(scene, &["--environment", "1,1,1"])
 }
 
-/// The left and the right half of the plate, beside `plain`'s, in the unit in which `plain` has ½.
+/// The left and the right half of the plate relative to `plain`'s, in the unit in which `plain` has ½.
 fn halves(seen: &Seen) -> [[f64; 3]; 2] {
     static PLAIN: OnceLock<[f64; 2]> = OnceLock::new();
     let plain = PLAIN.get_or_init(|| {
@@ -43,8 +43,9 @@ fn assert_color(seen: &Seen, expected: [f64; 3], file: &str) {
     }
 }
 
-/// False alarms: 16,384 samples of the light, uniform over directions, of standard deviation .65, would have one of .005 of their
-/// mean if they were independent; five of those. They are spread more evenly, so that an alarm is rarer than 1 in 10⁶.
+/// False alarms: 16,384 independent light samples, uniform over directions, with a standard deviation of .65, would have one of
+/// .005 for their mean; the tolerance is five of those. Actual samples are spread more evenly, so that an alarm is rarer than 1
+/// in 10⁶.
 #[test]
 fn the_plain_plate_has_half_of_the_light() {
     let Some(folder) = folder("02") else { return };
@@ -69,12 +70,12 @@ fn integers_may_be_written_with_a_fraction_and_extras_may_be_anything() {
     }
 }
 
-/// The image is one texel of this colour, in sRGB 188, 64, 128 of 255.
+/// The image is one texel of this colour: in sRGB 188, 64, 128 of 255.
 const TEXEL: [f64; 3] = [0.503, 0.051, 0.216];
 
 #[test]
 fn an_image_is_found_by_every_uri_that_is_valid_and_missed_with_a_warning() {
-    // No such file, another one where names are told apart by case, no URI, base64 of another alphabet.
+    // A missing file, a file name of different case, no URI, base64 of another alphabet.
     let missed = [
         "missing.gltf",
         "case-differs.gltf",
@@ -130,9 +131,9 @@ fn a_glb_that_is_damaged_is_refused_and_one_that_is_only_padded_otherwise_is_rea
     }
 }
 
-/// Files that glTF forbids are refused where it matters what is meant; where other viewers agree on it, they are shown with a warning.
+/// Files that glTF forbids are refused if their meaning is unclear. If other viewers agree on it, they are shown with a warning.
 #[test]
-fn what_gltf_forbids_is_refused_or_shown_as_other_viewers_do_with_a_warning() {
+fn forbidden_gltf_is_refused_or_shown_with_a_warning_as_other_viewers_do() {
     let refused = [
         ("alphaMode-lower-case.gltf", "alphaMode"),
         ("aspect-0.gltf", "aspectRatio"),
@@ -189,13 +190,13 @@ fn every_graph_of_nodes_shows_the_plate() {
     for scene in scenes(&folder, 12) {
         let file = name(&scene);
         match &*file {
-            // The plate is lit by what the file has.
+            // The file's own lights illuminate the plate.
             "light-thrice.gltf" | "spot-in-mirrored-node.gltf" => {
                 let seen = look(&scene, &[]);
                 seen.assert_mean(0.5, 0.001, "the centre", |x, y| x.abs().max(y.abs()) < 0.25);
             }
             "mirrored-plate.gltf" => look(&scene, &[]).assert_mean(0.5, 0.001, "all", |_, _| true),
-            // Of the default camera, which is framed on the plate and sees the light beside it.
+            // With the default camera, which frames the plate and sees the light next to it.
             "camera-in-other-scene.gltf" => {
                 let seen = look_in_white(&scene);
                 let framed = seen.warnings().iter().any(|line| line.contains("framed on its bounds"));

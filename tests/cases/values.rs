@@ -1,13 +1,13 @@
-//! Cases about light: the values that are known in closed form, or by another renderer's picture.
+//! Cases about light: values known in closed form, or from another renderer's picture.
 //!
-//! Tolerances are five standard deviations, measured over other seeds, beside what the radius may blur: a false alarm is rarer than 1 in
-//! 10⁶ for each value.
+//! Tolerances are five standard deviations, measured over other seeds, plus the blur of the radius: a false alarm is rarer than 1
+//! in 10⁶ for each value.
 
 use ppm_vk::internals::film::read_exr;
 
 use super::files::{Seen, assert_refused, folder, name, render, scenes};
 
-/// What a scene is seen as in the middle of the picture, where a block in the middle of it hides all else.
+/// Radiance in the middle of the picture, where a block hides everything else.
 fn is_middle(x: f64, y: f64) -> bool {
     x.abs().max(y.abs()) < 0.35
 }
@@ -21,7 +21,7 @@ fn all(_: f64, _: f64) -> bool {
     true
 }
 
-/// How rays meet faces: all the ways must agree where faces lie in one place.
+/// Ray-triangle tests and hierarchies: all must agree on coincident faces.
 const WAYS: [&[&str]; 4] = [
     &[],
     &["--accel", "brute", "--triangle-test", "havel"],
@@ -29,7 +29,7 @@ const WAYS: [&[&str]; 4] = [
     &["--backend", "cpu", "--triangle-test", "havel"],
 ];
 
-/// The part of a value that the first radius may cost or add.
+/// The relative error that the first radius may cause.
 const BIAS_OF_RADIUS: f64 = 0.01;
 
 /// 100 cd at 2 m, reflectance 0.8.
@@ -41,7 +41,7 @@ fn of_doubled_faces_the_one_in_front_is_seen_in_either_order() {
     for scene in scenes(&folder, 4) {
         for way in WAYS {
             let sampled = render(&scene, 9, 4, 2000, way);
-            // The pixel in the middle is so wide that the lamp is farther away at its edges by .04 %.
+            // The pixel in the middle is so wide that the lamp is .04 % farther away at its edges.
             let middle = |x: f64, y: f64| x.abs().max(y.abs()) < 0.1;
             sampled.assert_mean(WHITE_FACE, 0.001 * WHITE_FACE, &format!("the middle, {way:?}"), middle);
             if way.is_empty() {
@@ -57,9 +57,9 @@ fn of_doubled_faces_the_one_in_front_is_seen_in_either_order() {
     }
 }
 
-/// The sun, or whatever has no number, is missing, and everything else is right.
+/// The sun, or a light without a number, is missing, and everything else is correct.
 #[test]
-fn an_environment_with_what_is_no_radiance_gives_a_finite_picture_and_a_word() {
+fn an_environment_with_invalid_radiance_gives_a_finite_picture_and_a_warning() {
     let Some(folder) = folder("04") else { return };
     let plain = folder.join("plain.gltf");
     for (file, expected) in [
@@ -71,7 +71,7 @@ fn an_environment_with_what_is_no_radiance_gives_a_finite_picture_and_a_word() {
         let picture = folder.join(file);
         let seen = render(&plain, 8, 32, 512, &["--environment", picture.to_str().expect("UTF-8")]);
         match expected {
-            // As of the plain plate, and a pixel of the environment is dark.
+            // Like the plain plate, and a pixel of the environment is dark.
             Some(expected) => seen.assert_mean(expected, 0.025 + 0.003, file, all),
             None => assert!(seen.mean(all)[0] > 1.0, "{file}: the sun is missing; {}", seen.said),
         }
@@ -84,12 +84,12 @@ fn an_environment_with_what_is_no_radiance_gives_a_finite_picture_and_a_word() {
 }
 
 #[test]
-fn a_dome_that_shines_lights_what_lies_under_an_invisible_block() {
+fn an_emissive_dome_lights_the_plate_under_an_invisible_block() {
     let Some(folder) = folder("10") else { return };
     for scene in scenes(&folder, 8) {
         match &*name(&scene) {
             "no-dome-sun.gltf" => render(&scene, 16, 1, 500, &[]).assert_mean(0.5, 1e-4, "all", all),
-            // What is unlit is matter all the same, and this shuts out the sun.
+            // Unlit surfaces still block light, and this one shuts out the sun.
             "unlit-dome-sun.gltf" => {
                 let seen = render(&scene, 16, 1, 500, &[]);
                 seen.assert_mean(0.0, 0.0, "all", all);
@@ -101,7 +101,7 @@ fn a_dome_that_shines_lights_what_lies_under_an_invisible_block() {
 }
 
 #[test]
-fn the_sun_lights_what_lies_under_an_invisible_block_on_a_ground_of_any_size() {
+fn the_sun_lights_the_plate_under_an_invisible_block_on_a_ground_of_any_size() {
     let Some(folder) = folder("21") else { return };
     for scene in scenes(&folder, 4) {
         // Beside the block there is no noise.
@@ -109,7 +109,7 @@ fn the_sun_lights_what_lies_under_an_invisible_block_on_a_ground_of_any_size() {
     }
 }
 
-/// ½ in the middle and beside it, with such standard deviations.
+/// ½ in the middle and beside it, with these standard deviations.
 #[track_caller]
 fn assert_half(seen: &Seen, middle: f64, beside: f64) {
     seen.assert_mean(0.5, 5.0 * middle + BIAS_OF_RADIUS * 0.5, "the middle", is_middle);
@@ -119,7 +119,7 @@ fn assert_half(seen: &Seen, middle: f64, beside: f64) {
 
 #[test]
 fn a_pane_reflects_as_one_and_two_panes_as_two() {
-    // Of a wall of radiance 10, at right angles.
+    // Of a wall of radiance 10, at normal incidence.
     let once = 0.04;
     let twice = once * (1.0 + 0.96f64.powi(2) / (1.0 - once * once));
     let solid = 2.0 * once / (1.0 + once);
@@ -128,14 +128,14 @@ fn a_pane_reflects_as_one_and_two_panes_as_two() {
         let (expected, deviation) = match &*name(&scene) {
             "gap.gltf" => (twice, 0.008),
             "solid.gltf" => (solid, 0.008),
-            // Faces in one place are one pane (docs/files.md).
+            // Coincident panes are one pane (docs/files.md).
             _ => (once, 0.0),
         };
-        // Panes in one place have no noise by kernels; others need their samples, and have nothing to agree on. The plain renderer
-        // chooses by chance what a pane mirrors: 16,384 paths, of which four in a hundred see the wall.
+        // Coincident panes have no noise with kernels; others need their samples, and have no other result to agree with. The CPU
+        // renderer chooses a pane's reflection at random: 16,384 paths, of which four percent see the wall.
         for way in &WAYS[..if deviation == 0.0 { WAYS.len() } else { 1 }] {
             let seen = render(&scene, 16, 8, 2000, way);
-            // Away from the middle the angle is up to 8°, where 0.1 % more are reflected.
+            // Away from the middle the angle is up to 8°, where 0.1 % more is reflected.
             let by_chance = 10.0 * (once * (1.0 - once) / 16_384.0).sqrt();
             let deviation = if way.contains(&"cpu") { by_chance } else { deviation };
             let tolerance = 5.0 * deviation + 0.001 * 10.0 * expected;
@@ -144,8 +144,8 @@ fn a_pane_reflects_as_one_and_two_panes_as_two() {
     }
 }
 
-/// The references have a noise of .1 % of their mean. That of the largest terrain is compared by its mean alone: its patch of sun
-/// differs from that of the next smaller one, in which the same is to be seen.
+/// The references have a noise of .1 % of their mean. For the largest terrain only the mean is compared: its patch of sun differs
+/// from that of the next smaller one, which shows the same.
 #[test]
 fn a_room_with_a_window_is_as_a_path_tracer_has_it_whatever_lies_outside() {
     let Some(folder) = folder("32") else { return };
@@ -173,7 +173,7 @@ fn where_a_label_is_clear_the_wall_below_it_is_seen_in_either_order() {
             let seen = render(&scene, 16, 1, 500, way);
             // The light has no noise.
             seen.assert_mean(0.5, 1e-4, &format!("{way:?}"), |x, _| x > 0.0);
-            // A quarter of the label is black; of the small one, that ends within the picture.
+            // A quarter of the label is black; also of the small one, which ends within the picture.
             if name(&scene).contains("small") {
                 seen.assert_mean(0.0, 0.0, &format!("the label, {way:?}"), |x, _| x < -0.9);
             }
@@ -182,7 +182,7 @@ fn where_a_label_is_clear_the_wall_below_it_is_seen_in_either_order() {
 }
 
 #[test]
-fn glass_that_would_amplify_light_is_cut_to_what_is_clear_with_a_warning() {
+fn glass_that_would_amplify_light_is_clamped_to_clear_glass_with_a_warning() {
     let Some(folder) = folder("faults") else { return };
     let clear = render(&folder.join("att-one.gltf"), 16, 2, 4000, &[]);
     assert!(clear.warnings().is_empty(), "{}", clear.said);
@@ -196,7 +196,7 @@ fn glass_that_would_amplify_light_is_cut_to_what_is_clear_with_a_warning() {
         );
         assert!(
             cut.image == clear.image,
-            "{file}: other bits than of 1, where it is cut to that"
+            "{file}: the picture differs from that of the value 1, to which it is clamped"
         );
     }
 }

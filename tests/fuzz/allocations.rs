@@ -1,15 +1,15 @@
-//! How much memory the process takes.
+//! Counts the memory of the process.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 
-/// The most that all allocations together may take, in bytes: one that would go past it fails as one for which there is no memory.
+/// The maximum of all allocations together, in bytes: an allocation beyond it fails as if memory were exhausted.
 pub const MOST_BYTES: usize = 2 << 30;
 
 static TAKEN: AtomicIsize = AtomicIsize::new(0);
 static PEAK: AtomicIsize = AtomicIsize::new(0);
 
-/// The system's allocator, with an account and a limit.
+/// The system's allocator, with a count and a limit.
 struct Counting;
 
 #[global_allocator]
@@ -40,7 +40,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Enters an allocation, if it is within the limit.
+/// Counts an allocation, if it is within the limit.
 fn take(bytes: usize) -> bool {
     let taken = TAKEN.fetch_add(bytes as isize, Relaxed).saturating_add_unsigned(bytes);
     if taken < 0 || taken.unsigned_abs() > MOST_BYTES {
@@ -52,7 +52,7 @@ fn take(bytes: usize) -> bool {
     true
 }
 
-/// The most bytes that were taken at any time.
+/// Peak number of allocated bytes.
 pub fn peak() -> usize {
     PEAK.load(Relaxed).unsigned_abs()
 }

@@ -1,4 +1,4 @@
-//! Damage that keeps most of a file's structure, so that it reaches what lies below.
+//! Damage that keeps most of a file's structure, so that it reaches the inner layers.
 
 use serde_json::{Value, json};
 
@@ -45,7 +45,7 @@ const NUMBERS: [u64; 16] = [
     u64::MAX,
 ];
 
-/// Changes a few bytes, bits or little-endian numbers, and sometimes cuts, repeats or moves a part.
+/// Changes a few bytes, bits or little-endian numbers; sometimes cuts, repeats or moves a part.
 pub fn bytes(original: &[u8], random: &mut Random) -> Vec<u8> {
     let mut damaged = original.to_vec();
     if damaged.is_empty() {
@@ -56,7 +56,7 @@ pub fn bytes(original: &[u8], random: &mut Random) -> Vec<u8> {
         match random.below(6) {
             0 => damaged[at] = random.below(256) as u8,
             1 => damaged[at] ^= 1 << random.below(8),
-            // JSON is digits and punctuation above all: these changes often leave it JSON.
+            // JSON consists mostly of digits and punctuation: these changes often keep it valid.
             2 => damaged[at] = *random.of(b"0123456789-.eE,:[]{}\""),
             3 => damaged[at] = *random.of(original),
             4 => {
@@ -104,8 +104,8 @@ pub fn pointers(value: &Value) -> Vec<String> {
     all
 }
 
-/// Changes a few values of a JSON document, whose pointers are `places`: to others of the same name or of any, to numbers at
-/// the bounds of types; members are removed and moved to other objects, elements repeated and swapped.
+/// Changes a few values of a JSON document at the pointers `places`: to other values of the same or any name, or to numbers at
+/// the bounds of types. Members are removed and moved to other objects, elements repeated and swapped.
 pub fn json(value: &mut Value, places: &[String], random: &mut Random) {
     for _ in 0..=random.below(3) {
         let place = random.of(places);

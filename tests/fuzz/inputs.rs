@@ -1,4 +1,4 @@
-//! Sound files of every kind of data that is read.
+//! Valid files with every kind of data that is read.
 
 use std::io::Cursor;
 
@@ -16,8 +16,8 @@ use crate::encoded::{
 };
 use crate::fixture::Fixture;
 
-/// A scene that moves: views that are compressed, sparse and of small integers, strips, texture coordinates, colours, tangents to
-/// be made, morph targets, skins and animations.
+/// An animated scene: compressed and sparse views and small integers, strips, texture coordinates, colours, missing tangents,
+/// morph targets, skins and animations.
 pub fn moving() -> Fixture {
     let mut room = meshopt_room();
     room.set("/extensionsUsed/-", json!("KHR_mesh_quantization"));
@@ -125,7 +125,7 @@ pub fn draco() -> Fixture {
     room
 }
 
-/// A floor with a texture in every format.
+/// A floor with a texture in each format.
 pub fn pictured() -> Fixture {
     let mut room = Fixture::room();
     let encoded = |format| {
@@ -238,7 +238,7 @@ pub fn of_glb(bytes: &[u8]) -> Fixture {
     fixture
 }
 
-/// Environments in both formats, in every compression that is read: what they are, the end of their names, and they themselves.
+/// Environments in both formats, with every supported compression: description, file extension, and content.
 pub fn pictures() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     const SIZE: Vec2<usize> = Vec2(20, 10);
     let value = |i: usize| (i % 20) as f32 * 0.25 + 0.5;

@@ -1,4 +1,4 @@
-//! The files that damage is done to, and how they are read.
+//! The files that are damaged, and how they are read.
 
 use std::fs;
 use std::ops::Range;
@@ -15,14 +15,14 @@ use crate::fixture::Fixture;
 use crate::inputs;
 use crate::survival::{Outcome, assert_shines, assert_sound};
 
-/// A sound file.
+/// A valid file.
 pub enum Original {
     Scene(Box<SceneFile>),
     Picture(Picture),
 }
 
 impl Original {
-    /// What it is.
+    /// Its description.
     pub fn name(&self) -> &str {
         match self {
             Self::Scene(scene) => &scene.name,
@@ -30,7 +30,7 @@ impl Original {
         }
     }
 
-    /// Reads it as it is.
+    /// Reads it unchanged.
     pub fn read(&self) -> Outcome {
         match self {
             Self::Scene(scene) => scene.read(&scene.fixture.json, &scene.fixture.binary, None),
@@ -38,7 +38,7 @@ impl Original {
         }
     }
 
-    /// Reads it with the damage of that number.
+    /// Reads it with the damage of this number.
     pub fn damaged(&self, number: u64) -> Outcome {
         let mut random = Random::new(number);
         match self {
@@ -48,7 +48,7 @@ impl Original {
     }
 }
 
-/// All of them; those of `../shared` where that is there.
+/// All of them, including those of `../shared` if it exists.
 pub fn all() -> Vec<Original> {
     let scene = |name: &str, fixture| Original::Scene(Box::new(SceneFile::new(name, fixture)));
     let mut all = vec![
@@ -65,7 +65,7 @@ pub fn all() -> Vec<Original> {
     ] {
         match fs::read(shared.join(file)) {
             Ok(bytes) => all.push(scene(file, inputs::of_glb(&bytes))),
-            Err(_) => println!("skipped, for it isn't there: ../shared/assets/{file}"),
+            Err(_) => println!("skipped: missing: ../shared/assets/{file}"),
         }
     }
     all.extend(
@@ -76,7 +76,7 @@ pub fn all() -> Vec<Original> {
     all
 }
 
-/// Reads a plain scene as often as it has values for each of several others in their place.
+/// Reads a simple scene as often as it has values, with several replacements for each.
 pub fn with_replaced_values(read: impl Fn(u64, &dyn Fn() -> Outcome) -> Outcome) -> Vec<Outcome> {
     let scene = SceneFile::new("the room", Fixture::room());
     let values = [
@@ -115,7 +115,7 @@ pub struct SceneFile {
     fixture: Fixture,
     /// Pointers to all values.
     places: Vec<String>,
-    /// Where in the buffer views lie.
+    /// The byte ranges of views.
     views: Vec<Range<usize>>,
 }
 
@@ -176,7 +176,7 @@ impl SceneFile {
     }
 }
 
-/// A picture that is read as an environment.
+/// An image that is read as an environment.
 pub struct Picture {
     name: String,
     bytes: Vec<u8>,

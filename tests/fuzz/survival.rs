@@ -1,4 +1,4 @@
-//! What a damaged file may do at the worst.
+//! The permitted effects of a damaged file.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -10,13 +10,13 @@ use ppm_vk::internals::error::Result;
 use ppm_vk::internals::packing::PackedScene;
 use ppm_vk::internals::scene::{Environment, Projection, Scene};
 
-/// The longest that a small file may take, whatever is wrong with it, on a machine that does other things as well.
+/// Time limit for a small file, with whatever damage, on a busy machine.
 const MOST_TIME: Duration = Duration::from_secs(30);
 
-/// The file in hand, for what can't panic: a hang, and the end of memory.
+/// The current file, for failures that cannot panic: a hang, and exhausted memory.
 static NUMBER: AtomicU64 = AtomicU64::new(0);
 
-/// What became of a file.
+/// The result for a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     Loaded,
@@ -39,7 +39,7 @@ impl Outcome {
     }
 }
 
-/// Ends the process where a file takes too long: a hang can't be caught.
+/// Aborts the process if a file takes too long: a hang cannot be caught.
 pub struct Watch {
     since: Arc<AtomicU64>,
     over: Arc<AtomicBool>,
@@ -69,14 +69,14 @@ impl Watch {
         watch
     }
 
-    /// Reads a file, and says which it was where that panics.
+    /// Reads a file, and names it if reading panics.
     pub fn over(&self, number: u64, name: &str, read: impl FnOnce() -> Outcome) -> Outcome {
         NUMBER.store(number, Relaxed);
         self.since.store(self.start.elapsed().as_millis() as u64, Relaxed);
         catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| panic!("file {number}, made from {name}: see above"))
     }
 
-    /// The most memory that any took, in bytes.
+    /// Peak memory of all files, in bytes.
     pub fn peak(&self) -> usize {
         crate::allocations::peak()
     }
@@ -88,7 +88,7 @@ impl Drop for Watch {
     }
 }
 
-/// Says which file asks for too much. Allocates nothing.
+/// Names the file that allocates too much. Allocates nothing.
 pub fn report_memory(bytes: usize) {
     eprintln!("file {} asks for {bytes} bytes beyond the limit", NUMBER.load(Relaxed));
 }
@@ -98,7 +98,7 @@ fn assert_line(line: &str) {
     assert!(is_line, "not a line: {line:?}");
 }
 
-/// What a scene promises, however damaged the file that it came from.
+/// Invariants of a loaded scene, however damaged its file.
 pub fn assert_sound(scene: Scene) {
     assert!(!scene.triangles.is_empty() && !scene.cameras.is_empty());
     assert_eq!(scene.positions.len(), scene.normals.len());
@@ -131,7 +131,7 @@ pub fn assert_sound(scene: Scene) {
     PackedScene::new(&scene).expect("a hierarchy");
 }
 
-/// What an environment promises.
+/// Invariants of a loaded environment.
 pub fn assert_shines(environment: Environment) {
     let [width, height] = environment.size();
     assert!(width > 0 && height > 0);

@@ -1,4 +1,4 @@
-//! How many of many things agree, and which didn't.
+//! Counts how many comparisons agree, and describes those that differ.
 
 use std::fmt::Display;
 
@@ -10,11 +10,11 @@ pub struct Agreement {
     first: String,
 }
 
-/// Differences that a message shows.
+/// Maximum number of differences in a message.
 const SHOWN: usize = 3;
 
 impl Agreement {
-    /// Notes a comparison; `what` describes it if it failed.
+    /// Counts a comparison; `what` describes it if it failed.
     pub fn note<T: Display>(&mut self, agrees: bool, what: impl FnOnce() -> T) {
         self.compared += 1;
         if !agrees {
@@ -25,7 +25,7 @@ impl Agreement {
         }
     }
 
-    /// Fails if too few agreed, or too few were compared for the share to mean anything.
+    /// Fails if too few agreed, or if there were too few comparisons.
     pub fn assert(&self, what: &str, least_share: f64, least_compared: usize) {
         let share = (self.compared - self.differing) as f64 / self.compared.max(1) as f64;
         println!(

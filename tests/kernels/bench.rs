@@ -18,15 +18,15 @@ use ppm_vk::internals::random::{PathKind, Random};
 use ppm_vk::internals::scene::{Camera, Environment, LightKind, PunctualLight, Scene};
 use ppm_vk::internals::stage::BufferId;
 
-/// What the names of scenes end in that have a light of every kind more than their file.
+/// Suffix of scenes with an additional light of every kind.
 const LIT: &str = ", lit";
-/// The same where lights have an extent.
+/// The same with lights that have an extent.
 const SOFTLY_LIT: &str = ", softly lit";
-/// The same where what shines has a pattern.
+/// The same with patterned emissive surfaces.
 const PATTERNED: &str = ", patterned";
 
-/// A scene of `scenes/`; with lights of every kind if the name ends in [`LIT`] or [`SOFTLY_LIT`], with lamps of a pattern if in
-/// [`PATTERNED`].
+/// A scene of `scenes/`; with lights of every kind if the name ends in [`LIT`] or [`SOFTLY_LIT`], with patterned lamps if it ends
+/// in [`PATTERNED`].
 pub fn scene(name: &str) -> Scene {
     if let Some(name) = name.strip_suffix(PATTERNED) {
         let mut scene = scene(name);
@@ -51,7 +51,7 @@ pub fn scene(name: &str) -> Scene {
     Scene::load(&path).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Adds punctual lights, and an environment in which each direction has its own radiance.
+/// Adds punctual lights, and an environment with a different radiance in each direction.
 fn add_lights(scene: &mut Scene) {
     let light = |kind, position: Vec3, range| PunctualLight {
         kind,
@@ -83,7 +83,8 @@ fn add_lights(scene: &mut Scene) {
     scene.environment = Some(Environment::new(image).expect("an environment").rotated(77.0));
 }
 
-/// Gives what shines a texture of which one texel in 32 is bright. They aren't blended: next to 0, rounding would be all there is.
+/// Gives emissive surfaces a texture of which one texel in 32 is bright. It is not filtered: near 0 only rounding errors would
+/// remain.
 fn add_pattern(scene: &mut Scene) {
     const SIDE: u32 = 32;
     let mut lookup = TextureLookup::zeroed();
@@ -126,14 +127,14 @@ pub fn small() -> RenderConfig {
     }
 }
 
-/// Visible points of the device, and how they scatter; of no glossy scene the latter is empty.
+/// Visible points of the device with their BSDFs, which are empty if the scene is not glossy.
 pub struct Seen {
     pub points: Vec<VisiblePoint>,
     pub bsdfs: Vec<PackedBsdf>,
 }
 
 impl Seen {
-    /// As the CPU gathers at them, with R² of each.
+    /// As receivers of the CPU's gather, with R² of each.
     pub fn with<'a>(&'a self, radii2: &'a [f32]) -> DeviceReceivers<'a> {
         DeviceReceivers {
             points: &self.points,
@@ -157,12 +158,12 @@ impl Bench {
         Self::with(name, config, |_| ())
     }
 
-    /// The same with a change to the scene.
+    /// With a change to the scene.
     pub fn with(name: &str, config: RenderConfig, change: impl FnOnce(&mut PackedScene)) -> Self {
         Self::seen_with(name, config, |scene, _| change(scene))
     }
 
-    /// The same with a change to the scene or its camera.
+    /// With a change to the scene or its camera.
     pub fn seen_with(name: &str, config: RenderConfig, change: impl FnOnce(&mut PackedScene, &mut Camera)) -> Self {
         let loaded = scene(name);
         let mut scene = packed(&loaded);
@@ -181,12 +182,12 @@ impl Bench {
         }
     }
 
-    /// The same by the plain renderer.
+    /// The plain CPU renderer for the same scene.
     pub fn plain(&self) -> cpu::Renderer {
         cpu::Renderer::new(&self.scene, &self.camera, self.config.clone()).expect("a renderer")
     }
 
-    /// What the CPU's functions read.
+    /// The inputs of the CPU's functions.
     pub fn inputs(&self) -> cpu::Inputs<'_> {
         cpu::Inputs {
             scene: &self.scene,
@@ -207,14 +208,14 @@ impl Bench {
         }
     }
 
-    /// What a buffer of the device holds.
+    /// The content of a buffer of the device.
     pub fn download<T: bytemuck::AnyBitPattern>(&mut self, id: BufferId) -> Vec<T> {
         download(&mut self.renderer, id)
     }
 
-    /// Makes a buffer of the device hold this.
+    /// Sets the content of a buffer of the device.
     pub fn upload<T: bytemuck::NoUninit>(&mut self, id: BufferId, data: &[T]) {
-        // The renderer makes buffers of another size anew.
+        // The renderer recreates buffers of another size.
         let mut bytes: Vec<u8> = bytemuck::cast_slice(data).to_vec();
         if let Some(size) = self.renderer.sizes().bytes(id) {
             assert!(
@@ -251,12 +252,12 @@ pub fn xyz<const N: usize>(v: [f32; N]) -> DVec3 {
     DVec3::new(v[0].into(), v[1].into(), v[2].into())
 }
 
-/// The object of a visible point or a photon, `None` for a visible point on no matte surface.
+/// The object of a visible point or a photon; `None` for a slot without a visible point.
 pub fn object(object: u32) -> Option<u32> {
     (object != NO_OBJECT).then_some(object & !CAUSTIC)
 }
 
-/// Largest coordinates of an object, without their signs, or a little more: kernels leave visible points by them.
+/// Upper bound of an object's absolute coordinates, as kernels use it to offset rays from visible points.
 pub fn reach_of(scene: &PackedScene, object: u32) -> DVec3 {
     let grid = &scene.object_grids[object as usize];
     let low = DVec3::from_array(grid.low.map(f64::from));

@@ -11,7 +11,7 @@ use ppm_vk::internals::stage::{BufferId, StageDesc};
 use super::agreement::Agreement;
 use super::bench::{Bench, object, reach_of, small, visible_point, xyz};
 
-/// What the first iteration of the stage finds at these points with these radii.
+/// Results of the stage's first iteration for visible points with these radii.
 fn on_device(bench: &mut Bench, points: &[VisiblePoint], radii2: &[f32], statistics: &[Statistics]) -> Vec<Coverage> {
     bench.upload(BufferId::VisiblePoints, points);
     bench.upload(BufferId::Radii2, radii2);
@@ -39,7 +39,7 @@ fn on_device(bench: &mut Bench, points: &[VisiblePoint], radii2: &[f32], statist
 }
 
 #[test]
-fn points_can_have_photons_where_the_cpu_says_so() {
+fn coverage_of_the_device_is_that_of_the_cpu() {
     for name in ["cornell", "cornell-spheres", "pool", "instances"] {
         let config = RenderConfig {
             radius: Some(0.1),
@@ -49,7 +49,7 @@ fn points_can_have_photons_where_the_cpu_says_so() {
         let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
         let mut statistics: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
         let radii2: Vec<f32> = bench.download(BufferId::Radii2);
-        // Those without photons look around.
+        // Points without photons look around.
         for statistics in statistics.iter_mut().step_by(2) {
             (statistics.accepted_low, statistics.accepted_high) = (0, 0);
         }
@@ -89,7 +89,7 @@ fn points_can_have_photons_where_the_cpu_says_so() {
                 behind.skip_to(COVERAGE_WHOLE);
                 let [u, v, ..] = behind.next4();
                 let is_surrounded = cpu::is_surrounded(&inputs, place, [u, v]);
-                // A caustic photon says that it isn't in the open.
+                // A caustic photon shows that the point is surrounded.
                 let asks =
                     receiver + points.len() >= statistics.len() || statistics[receiver + points.len()].accepted() == 0;
                 agreement.note(!asks || (found.surrounded > 0) == is_surrounded, || {
@@ -99,15 +99,15 @@ fn points_can_have_photons_where_the_cpu_says_so() {
             surrounded += u32::from(found.surrounded > 0);
             partly += u32::from(found.covered < found.asked);
         }
-        // A point next to an edge lies on either side by rounding.
+        // For a point next to an edge, rounding decides on which side it lies.
         agreement.assert(&format!("coverage in {name}"), 0.99, 2000);
         assert!(surrounded > 500, "{name}: only {surrounded} points are surrounded");
         assert!(partly > 20, "{name}: only {partly} discs reach past an edge");
     }
 }
 
-/// Each of 1,024 discs asks 16 points; that the mean of their shares is off by six deviations of independent points has a
-/// probability of 2·10⁻⁹.
+/// Each of 1,024 discs takes 16 samples. The mean of the covered fractions differs by six standard deviations of independent
+/// samples with a probability of 2·10⁻⁹.
 #[test]
 fn discs_that_reach_past_a_wall_are_covered_by_their_part_before_it() {
     let config = RenderConfig {
@@ -143,7 +143,7 @@ fn discs_that_reach_past_a_wall_are_covered_by_their_part_before_it() {
         let found = on_device(&mut bench, &points, &radii2, &vec![lit; count]);
         let covered: u32 = found.iter().map(|coverage| coverage.covered).sum();
         let share = f64::from(covered) / (16 * count) as f64;
-        // A segment of the disc lies past the wall.
+        // A segment of the disc lies beyond the wall.
         let x = f64::from(distance).min(1.0);
         let expected = 1.0 - (x.acos() - x * (1.0 - x * x).sqrt()) / std::f64::consts::PI;
         let deviation = (expected * (1.0 - expected) / (16 * count) as f64).sqrt();

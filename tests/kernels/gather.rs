@@ -1,4 +1,4 @@
-//! The gather methods: every one finds the same photons, N and M exactly, as testing each photon on the CPU.
+//! The gather methods: each finds the same photons as testing every photon on the CPU, with N and M exact.
 
 use glam::DVec3;
 use ppm_vk::internals::backend::Backend;
@@ -69,7 +69,7 @@ fn assert_methods_agree_on(
         let weight = xyz(points[index % points.len()].weight);
         let mut updated = cpu::Statistics::from(before);
         updated.take(gathered.count, weight * gathered.flux, alpha);
-        // The curvature goes the flux's way.
+        // The curvature is accumulated like the flux.
         let mut curvature = cpu::Statistics::from(before);
         curvature.flux = DVec3::splat((before.flux_high[3] + before.flux_low[3]).into());
         let of_disc = weight.element_sum() / 3.0 * gathered.curvature(before.radius2_high.into());
@@ -147,7 +147,7 @@ fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[(cpu::St
             found.accepted, expected.accepted,
             "{what}, slot {slot}: photons accepted"
         );
-        // Sums of f32, added up in another order: √M roundings.
+        // Sums of f32 in another order: √M roundings.
         for (tau, expected) in found.flux.to_array().into_iter().zip(expected.flux.to_array()) {
             let difference = relative_difference(tau, expected);
             assert!(
@@ -165,7 +165,7 @@ fn assert_same_statistics(what: &str, found: &[Statistics], expected: &[(cpu::St
     }
 }
 
-/// Gives the scene so many objects, each of which fills it.
+/// Gives the scene this number of objects, each as large as the scene.
 fn with_objects(count: u32) -> impl FnOnce(&mut PackedScene) {
     move |scene| {
         let grid = |object| ObjectGrid {
@@ -215,7 +215,7 @@ fn all_methods_agree_in_every_scene_at_any_radius_early_and_late() {
 }
 
 #[test]
-fn more_than_ten_thousand_meshes_some_without_photons_or_visible_points_are_told_apart() {
+fn more_than_ten_thousand_meshes_some_without_photons_or_visible_points_are_distinguished() {
     const MESHES: u32 = 10_007;
     let config = RenderConfig {
         resolution: [64, 64],
@@ -225,7 +225,7 @@ fn more_than_ten_thousand_meshes_some_without_photons_or_visible_points_are_told
     };
     let mut bench = Bench::with("cornell", config, with_objects(MESHES));
     let slots = bench.renderer.sizes().slots();
-    // 4,096 points on 10,007 meshes leave most without one; photons lie on every second mesh.
+    // Most of 10,007 meshes have none of the 4,096 points; photons lie on every second mesh.
     let mesh = |u: f32| (u * MESHES as f32) as u32;
     let points: Vec<VisiblePoint> = random_numbers(slots)
         .map(|[x, y, u, _]| visible_point([2.0 * x - 1.0, 2.0 * y - 1.0, 0.0], mesh(u)))
@@ -264,7 +264,7 @@ fn all_methods_agree_on_traced_photons_at_any_radius() {
 }
 
 #[test]
-fn all_methods_agree_on_what_glossy_surfaces_scatter_to_the_viewer() {
+fn all_methods_agree_on_light_that_glossy_surfaces_scatter_to_the_viewer() {
     let mut bench = Bench::new("glossy", small());
     let (seen, photons) = (bench.seen(), bench.photons());
     let statistics = with_radius(&bench, bench.renderer.radius().powi(2));
@@ -321,8 +321,8 @@ fn no_photon_and_one_photon_are_gathered() {
 #[test]
 fn a_photon_at_distance_r_counts_and_the_next_one_beyond_does_not() {
     let mut bench = Bench::with("cornell", tiny(), with_objects(64));
-    // Coordinates are multiples of 2⁻²⁰ and 5² = 4² + 3²: f32 holds all distances exactly. Each visible point has an
-    // object of its own.
+    // Coordinates are multiples of 2⁻²⁰ and 5² = 4² + 3²: f32 represents all distances exactly. Each visible point has its own
+    // object.
     let grid = |u: f32| ((2.0 * u - 1.0) * 512.0).round() / 1024.0;
     let radius = 5.0f32 / 64.0;
     let (mut points, mut photons) = (Vec::new(), Vec::new());
@@ -368,7 +368,7 @@ fn photons_of_another_object_or_from_behind_do_not_count() {
 fn photons_that_lie_in_one_cell_are_all_found() {
     let mut bench = Bench::new("cornell", tiny());
     let points = plane(&bench);
-    // Cells are as large as the radii: 4,099 photons, a prime, within a thousandth of one.
+    // Cells are as large as the radii: 4,099 photons, a prime, lie within a thousandth of one.
     let photons: Vec<Photon> = random_numbers(4099)
         .map(|[x, y, r, g]| photon([0.3 + 1e-4 * x, -0.2 + 1e-4 * y, 0.0], 0, [r, g, 1.0]))
         .collect();
@@ -379,8 +379,7 @@ fn photons_that_lie_in_one_cell_are_all_found() {
 
 #[test]
 fn more_photons_than_a_loop_may_test_are_all_tested() {
-    // Some drivers end an invocation's loops at 65,535 iterations, without a word. A prime again, so that no range or
-    // block is full.
+    // Some drivers silently end an invocation's loops at 65,535 iterations. A prime again, so that no range or block is full.
     let mut bench = Bench::new("cornell", tiny());
     let points = plane(&bench);
     let photons: Vec<Photon> = random_numbers(70_001)

@@ -1,4 +1,4 @@
-//! Instances that share triangles, against the same scene where every node has a mesh of its own.
+//! Instances with shared triangles, compared with the same scene where every node has its own mesh.
 
 use std::path::{Path, PathBuf};
 
@@ -29,7 +29,7 @@ fn document() -> Value {
     serde_json::from_str(&text).expect("JSON")
 }
 
-/// Gives each node a mesh of its own: nothing is shared.
+/// Gives each node its own mesh: nothing is shared.
 fn take_apart(document: &mut Value) {
     for node in 0..document["nodes"].as_array().expect("nodes").len() {
         let Some(mesh) = document["nodes"][node]["mesh"].as_u64() else {
@@ -58,7 +58,7 @@ fn apart() -> Scene {
     load(&document)
 }
 
-/// Rays between places in the room.
+/// Rays between points in the room.
 fn rays(count: u32) -> Vec<Ray> {
     let numbers: Vec<[f32; 4]> = random_numbers(2 * count).collect();
     let place = |[x, y, z, _]: [f32; 4]| 1.8 * Vec3::new(x, y, z) - 0.9;
@@ -151,7 +151,7 @@ fn the_same_meshes_are_shared_whatever_their_nodes_transforms() {
         .iter()
         .filter(|instance| instance.flags & MIRRORED != 0);
     assert_eq!(mirrored.count(), 2);
-    // What stands on the floor touches it, in whichever way it is stored.
+    // Objects on the floor touch it, whether they are shared or not.
     let touched = |scene: &PackedScene| {
         scene
             .shading_triangles
@@ -160,7 +160,7 @@ fn the_same_meshes_are_shared_whatever_their_nodes_transforms() {
             .count()
     };
     assert!(touched(&shared) > 0 && touched(&apart) >= touched(&shared));
-    // The pair's other glass, and the room, are the same.
+    // The other glass of the pair, and the room, are unchanged.
     assert_eq!(shared.object_grids.len(), apart.object_grids.len());
     for (grid, expected) in shared.object_grids.iter().zip(&apart.object_grids) {
         let apart = Vec3::from(grid.low).distance(Vec3::from(expected.low));
@@ -168,8 +168,8 @@ fn the_same_meshes_are_shared_whatever_their_nodes_transforms() {
     }
 }
 
-/// Exchanges both triangles of the lamp, which follow the hierarchy's order, where they are the other way round than wanted:
-/// the same numbers choose the same then.
+/// Swaps both triangles of the lamp, which are in the order of the hierarchy, if their order is not the wanted one: then the same
+/// random numbers choose the same triangle.
 fn order_lamp(scene: &mut PackedScene, wanted: &PackedScene) {
     assert_eq!(scene.lights.len(), 2);
     let first = |scene: &PackedScene| {
@@ -201,7 +201,7 @@ fn picture(scene: &Scene, packed: &PackedScene, iterations: u32) -> Image {
     renderer.resolve().expect("a picture")
 }
 
-/// The same paths: what differs is the few of them that rounding sends another way.
+/// The same paths: only the few that rounding deflects differ.
 fn assert_same_picture(shared: &Scene, apart: &Scene, iterations: u32, most: f64) {
     let (packed_shared, mut packed_apart) = (packed(shared), packed(apart));
     assert!(packed_shared.features.instanced && !packed_apart.features.instanced);
@@ -217,8 +217,7 @@ fn the_picture_of_instances_is_that_of_meshes_of_their_own() {
     assert_same_picture(&scene("instances"), &apart(), 8, 1e-4);
 }
 
-/// Floats are fine where the floor is: nothing in its own coordinates tells how far the rounding of an instance may put its
-/// bottom from it.
+/// f32 is precise near the floor: the instance's own coordinates do not show how far rounding can move its bottom.
 #[test]
 fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
     let mut document = document();
@@ -235,7 +234,7 @@ fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
             "rotation": [0, turn.sin(), 0, turn.cos()], "scale": [0.6, height, 0.5]
         }));
     }
-    // Products of two scales aren't numbers of 24 bits.
+    // Products of two scales need more than 24 bits.
     let all = nodes.len();
     let glasses: Vec<usize> = (first..all).collect();
     nodes.push(json!({"children": glasses, "scale": [0.9, 1.1, 0.95]}));
@@ -251,7 +250,7 @@ fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
         .expect("a floor");
     let corner = apart.triangles[floor.triangles.start as usize].vertices[0] as usize;
     assert_eq!(apart.positions[corner].y, 0.0);
-    // Some bottoms lie above it now by a rounding of their height.
+    // Some bottoms now lie above the floor by a rounding error of their height.
     let scene = packed(&shared);
     let bottoms = scene.instances.iter().filter_map(|instance| {
         let triangles =
@@ -264,6 +263,6 @@ fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
     let bottoms: Vec<f32> = bottoms.collect();
     println!("{bottoms:?}");
     assert!(bottoms.iter().any(|&y| y > 0.0 && y < 1e-8));
-    // Light takes many ways through so much glass. Without the reach of instances relMSE is 0.005.
+    // Light takes many paths through this much glass. Without the reach of instances relMSE is 0.005.
     assert_same_picture(&shared, &apart, 48, 2e-3);
 }

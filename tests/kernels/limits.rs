@@ -1,5 +1,5 @@
-//! What a driver's limits must not do to a picture. Mesa's llvmpipe, for years, has ended all loops of an invocation
-//! together after 65,535 iterations, without a word; the gathers have a test of that too.
+//! Limits of a driver must not change a picture. For years Mesa's llvmpipe has silently ended all loops of an invocation together
+//! after 65,535 iterations; the gathers have a test of it too.
 
 use glam::DVec3;
 use ppm_vk::internals::backend::Backend;
@@ -31,8 +31,8 @@ fn no_photon_is_lost_where_a_lane_follows_many_paths() {
     assert_eq!(counters.cut_paths, 0, "paths that were cut short");
     let expected = bench.plain().trace_photon_paths(0, 0..bench.config.photons).0.len();
     println!("{expected} photons on the CPU, on the device {counters:?}");
-    // Numbers of photons of a path have a standard deviation below twice their mean: 0.45 % of a difference of two such means. Six of
-    // those fail a right program once in 10⁸ times.
+    // The number of photons per path has a standard deviation below twice its mean: 0.45 % of a difference of two such means. Six
+    // standard deviations: a correct program fails once in 10⁸ runs.
     let difference = relative_difference(counters.photons_stored as f64, expected as f64);
     assert!(
         difference < 0.027,
@@ -42,10 +42,10 @@ fn no_photon_is_lost_where_a_lane_follows_many_paths() {
 
 #[test]
 fn an_iteration_that_is_done_again_counts_once() {
-    // Rays that test 4,000 triangles take more iterations of loops than some drivers give to two paths of a lane: there
-    // the iteration is done again, one path a lane. What is seen directly is summed up whatever the photons do.
+    // Rays that test 4,000 triangles take more loop iterations than some drivers allow for two paths of a lane. Then the
+    // iteration is repeated with one path per lane. The sum of direct light does not depend on the photons.
     let config = RenderConfig {
-        // Eight camera paths a pixel.
+        // Eight camera paths per pixel.
         resolution: [16, 16],
         photons: 4200,
         accel: Accel::Brute,
@@ -81,12 +81,12 @@ fn an_iteration_that_is_done_again_counts_once() {
 }
 
 #[test]
-fn an_iteration_in_batches_gathers_what_one_batch_gathers() {
+fn an_iteration_in_batches_gathers_the_same_as_one_batch() {
     let config = RenderConfig {
         resolution: [32, 32],
         photons: 60_000,
         radius: Some(0.1),
-        // What is learned depends on the batches.
+        // The learned tables depend on the batches.
         emission: EmissionChoice::Power,
         ..small()
     };
@@ -175,7 +175,7 @@ fn an_iteration_that_is_cut_short_counts_with_its_photons_if_it_is_the_first_and
         assert_eq!((cut.iterations(), cut.emitted()), (1, emitted), "{name}");
         assert!(
             cut.resolve().expect("a picture") == first,
-            "{name}: the second one left something in the picture"
+            "{name}: the second photon is in the picture"
         );
         assert_eq!(cut.counters().photons_stored, stored, "{name}");
     }

@@ -1,4 +1,4 @@
-//! The CPU's functions against each other and against what is known.
+//! The CPU's functions compared with each other and with known results.
 
 use glam::DVec3;
 use ppm_vk::internals::backend::Backend;
@@ -79,7 +79,7 @@ fn no_ray_leaves_a_closed_room() {
 }
 
 #[test]
-fn the_kd_tree_finds_what_testing_every_photon_finds() {
+fn the_kd_tree_finds_the_same_as_testing_every_photon() {
     let bench = Bench::new("cornell-spheres", small());
     let plain = bench.plain();
     let paths = plain.trace_camera_paths(CameraTurn::FIRST);
@@ -149,7 +149,7 @@ fn one_seed_gives_the_same_bits_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn a_closed_furnace_shines_with_emission_over_one_minus_albedo() {
+fn a_closed_furnace_has_radiance_emission_over_one_minus_albedo() {
     // Le = 1, ρ = (0.2, 0.5, 0.8).
     let expected = [1.25, 2.0, 5.0];
     for direct in [Direct::Light, Direct::Photons] {
@@ -157,7 +157,7 @@ fn a_closed_furnace_shines_with_emission_over_one_minus_albedo() {
             direct,
             resolution: [32, 32],
             photons: 20_000,
-            // A larger one reaches past the walls' edges, where there are no photons.
+            // A larger disc reaches past the walls' edges, where there are no photons.
             radius: Some(0.02),
             ..small()
         };

@@ -1,5 +1,5 @@
-//! Orders of visible points: every point once, one mesh or cluster a workgroup, and k-means clusters that are tighter
-//! than the runs that they begin with.
+//! Orders of visible points: every point once, one mesh or cluster per workgroup, and k-means clusters that are more compact than
+//! their initial runs.
 
 use std::collections::HashMap;
 
@@ -12,7 +12,7 @@ use ppm_vk::internals::stage::BufferId;
 
 use super::bench::{Bench, object, small, xyz};
 
-/// Visible points of `cornell-spheres`, and the order that a method puts them into.
+/// Visible points of `cornell-spheres`, in the order of a method.
 fn order_of(method: &str) -> (Bench, Vec<VisiblePoint>, Vec<u32>) {
     let config = RenderConfig {
         resolution: [203, 101],
@@ -26,7 +26,7 @@ fn order_of(method: &str) -> (Bench, Vec<VisiblePoint>, Vec<u32>) {
     (bench, points, order)
 }
 
-/// Slots of each workgroup, fillers left out; the ones past the last point aren't there.
+/// Slots of each workgroup without fillers, up to the last point.
 fn groups(order: &[u32]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = order
         .chunks(GROUP as usize)

@@ -11,7 +11,7 @@ use ppm_vk::internals::stage::BufferId;
 use super::agreement::Agreement;
 use super::bench::{Bench, object, small, xyz};
 
-/// The photons of each lane as the device stored them: number-major, `[number][lane]`.
+/// The photons of each lane as the device stores them: `[number][lane]`.
 fn lanes_on_device(bench: &mut Bench) -> Vec<Vec<Photon>> {
     let counts: Vec<u32> = bench.download(BufferId::LaneCounts);
     let stored: Vec<Photon> = bench.download(BufferId::LanePhotons);
@@ -24,7 +24,7 @@ fn lanes_on_device(bench: &mut Bench) -> Vec<Vec<Photon>> {
     counts.iter().enumerate().map(lane).collect()
 }
 
-/// Mean and variance of the mean over the paths of the flux that each object gets, from the paths' photons in so many groups.
+/// Mean, and variance of the mean, of the flux that each object receives, from the photons of this number of groups of paths.
 fn flux_of_objects(groups: &[Vec<Photon>], paths: u32, objects: usize) -> Vec<[f64; 2]> {
     let count = groups.len() as f64;
     let of_object = |wanted: u32| {
@@ -49,11 +49,12 @@ fn is_coated(scene: &PackedScene, object: u32) -> bool {
     triangle.is_some_and(|triangle| scene.materials[triangle.material as usize].coat > 0.0)
 }
 
-/// Paths of a batch: each lane has as many as any other.
+/// Paths of a batch: the same number in each lane.
 const PATHS: u32 = 65_536;
 
-/// Flux that each object gets, of paths that are aimed, of those that start by power, and of the CPU's. Sums of a thousand groups
-/// and more are nearly normal: six standard errors fail a right program once in 5·10⁸ times for each of fewer than 400 numbers.
+/// Flux that each object receives: of aimed paths, of paths started by power, and of the CPU's. Sums of a thousand groups and
+/// more are nearly normal: with six standard errors a correct program fails once in 5·10⁸ times for each of fewer than 400
+/// numbers.
 fn assert_flux_agrees(name: &str, accel: Accel) {
     let config = |emission| RenderConfig {
         direct: Direct::Photons,
@@ -84,7 +85,7 @@ fn assert_flux_agrees(name: &str, accel: Accel) {
         );
         let found = flux_of_objects(&lanes, PATHS, objects);
         for (object, (found, expected)) in found.iter().zip(&expected).enumerate() {
-            // On coated materials the kernels' photons have their flux across their rays.
+            // On coated materials the flux of the kernels' photons is per area across the ray.
             if is_coated(&bench.scene, object as u32) {
                 continue;
             }
@@ -125,7 +126,7 @@ fn photons_bring_each_object_the_flux_that_the_cpus_bring() {
     assert_flux_agrees("cornell", Accel::Brute);
 }
 
-/// Starts by power: the same numbers choose the same light, place and direction.
+/// Starts by power: the same numbers choose the same light, position and direction.
 #[test]
 fn paths_start_where_the_cpus_start() {
     for name in [
@@ -160,7 +161,7 @@ fn paths_start_where_the_cpus_start() {
                 format!("path {path}: {found:?} on the device, {expected:?}, flux {flux} on the CPU")
             });
         }
-        // A number next to the edge of a light's part, of an environment's pixel or of a texel lies on either side by rounding.
+        // Rounding decides on which side of the edge of a light's part, of a pixel or of a texel a number lies.
         agreement.assert(&format!("starts in {name}"), 0.995, 4000);
     }
 }

@@ -1,5 +1,5 @@
-//! Pictures by kernels and by the plain renderer: two programs that share the scene's layout and the random numbers, and nothing
-//! else of how light is followed.
+//! Pictures of the kernels and of the plain renderer: two programs that share the scene's layout and the random numbers, but no
+//! code that transports light.
 
 use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::{Direct, EmissionChoice, Estimator, RenderConfig, SEQUENCES};
@@ -28,7 +28,7 @@ fn blocks(pixels: &[[f32; 4]]) -> Vec<f64> {
     sums
 }
 
-/// Of a render, the pictures of its sequences, which are independent of each other unless their visible points are the same.
+/// The pictures of a render's sequences, which are independent of each other unless their visible points are the same.
 fn samples(renderer: &mut dyn Backend, estimator: Estimator) -> Vec<Vec<f64>> {
     while renderer.iterations() < 8 {
         renderer.iterate().expect("an iteration");
@@ -57,8 +57,9 @@ fn mean_of(samples: &[f64]) -> (f64, f64) {
 }
 
 /// A difference of means of 12 samples exceeds 7.5 of its standard errors with a probability of 2·10⁻⁷ (Student, 22 degrees of
-/// freedom): 51 numbers of each of 21 cases fail a right pair of programs once in 4,500 runs. What radii blur is alike but for
-/// their number of maps: half a hundredth of a block, which is taken off, and three thousandths of the whole picture.
+/// freedom): 51 numbers of each of 21 cases fail a correct pair of programs once in 4,500 runs. Blurring by the radii is the same
+/// except for the number of maps: allowances of half a percent for a block and three thousandths for the whole picture are
+/// subtracted.
 #[test]
 fn both_renderers_converge_to_the_same_picture() {
     const STUDENT: f64 = 7.5;
@@ -106,8 +107,8 @@ fn both_renderers_converge_to_the_same_picture() {
                 seed,
                 ..small()
             };
-            // The paper's estimator looks through the pixels' centres. In the middle of a room those of the picture's diagonals meet
-            // the edges of walls, where rounding says which wall is seen.
+            // The paper's estimator samples the pixels' centres. In the middle of a room, those on the picture's diagonals hit
+            // the edges of walls, where rounding decides which wall is seen.
             let mut bench = Bench::seen_with(name, config, |_, camera| {
                 camera.forward += 0.01 * camera.right + 0.007 * camera.up;
             });

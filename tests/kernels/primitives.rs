@@ -1,4 +1,4 @@
-//! Prefix sums and sorting: exact.
+//! Prefix sums and sorting, which are exact.
 
 use ppm_vk::internals::gather;
 use ppm_vk::internals::gpu::Device;
@@ -73,12 +73,12 @@ fn a_scan_wraps_around_at_2_to_the_32() {
     assert_scans(&mut device(), vec![u32::MAX; 5000]);
 }
 
-/// Sorts `keys`, numbered by their values, on a device with room for `capacity`.
+/// Sorts `keys`, with their indices as values, on a device with this `capacity`.
 fn assert_sorts(device: &mut Device, case: &str, keys: Vec<u32>, capacity: usize, bits: u32) {
     let count = keys.len();
     let values: Vec<u32> = (0..count as u32).collect();
     let padded = |words: &[u32]| {
-        // What lies past the count must not matter.
+        // Entries past the count must be ignored.
         let mut words = words.to_vec();
         words.resize(capacity, 0);
         words
@@ -124,7 +124,7 @@ fn a_sort_is_exact_and_stable() {
     let mut device = device();
     let capacity = 20_000;
     // The low 12 bits occur five times each: their values show whether the order of equal keys is kept.
-    // Of one pass, of several, by digits of all lengths.
+    // In one pass and in several, with digits of all lengths.
     for bits in [1, 4, 5, 8, 9, 12, 20, 22, 32] {
         let mask = u32::MAX >> (32 - bits);
         let random: Vec<u32> = random_words(capacity, bits).iter().map(|word| word & mask).collect();

@@ -1,5 +1,5 @@
-//! Rays against triangles on the device: where rounding decides, nothing may pass between two triangles, whether the kernels or the
-//! device itself trace the ray.
+//! Ray-triangle intersection on the device: despite rounding no ray may pass between two triangles, whether kernels or the
+//! device's ray queries trace it.
 
 use glam::Vec3;
 use ppm_vk::internals::config::{Accel, RenderConfig, TriangleTest};
@@ -23,7 +23,7 @@ pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
     [origin, direction].map(|v| [v.x, v.y, v.z, 0.0])
 }
 
-/// What rays meet.
+/// Results of the probe.
 pub struct Probe {
     renderer: Renderer,
     triangle_test: TriangleTest,
@@ -31,7 +31,7 @@ pub struct Probe {
     features: SceneFeatures,
 }
 
-/// What rays can be traced by here. Says so where that leaves out the device itself.
+/// The available ways to trace rays. Prints a message without ray queries.
 pub fn accels() -> Vec<Accel> {
     let device = best_device().expect("a device");
     let mut accels = vec![Accel::Bvh, Accel::Brute];
@@ -90,7 +90,7 @@ impl Probe {
         gpu.download(BufferId::ProbeTo, Some(rays.len())).expect("hits")
     }
 
-    /// How many of the rays meet nothing, and one of them.
+    /// How many of the rays hit nothing, and one of them.
     fn leaks(&mut self, rays: impl Iterator<Item = Ray>) -> (usize, usize, Option<Ray>) {
         let (mut traced, mut leaked, mut first) = (0, 0, None);
         let mut rays = rays.peekable();
@@ -111,7 +111,7 @@ impl Probe {
     }
 }
 
-/// Both tests on the same rays: none may pass with the watertight one, whoever traces them; what passes with Havel's is counted.
+/// Both triangle tests for the same rays: none may pass with the watertight one; those that pass with Havel's are counted.
 fn assert_tight(what: &str, scene: &Scene, rays: impl Fn() -> Box<dyn Iterator<Item = Ray>>) {
     let (_, by_havel, _) = Probe::with(scene, TriangleTest::Havel, Accel::Bvh).leaks(rays());
     println!("{what}: {by_havel} rays leave with Havel's test");
@@ -135,7 +135,7 @@ fn rays_meet_the_same_triangles_at_the_same_places_by_every_search() {
             .chunks_exact(2)
             .map(|pair| ray(place(pair[0]), place(pair[1]) - place(pair[0])))
             .collect();
-        // Some drivers end loops early, of which a ray may use a quarter.
+        // Some drivers end loops early; a ray may use a quarter of the limit.
         let limit = Device::open(None)
             .and_then(|mut device| device.loop_limit())
             .expect("a limit");
@@ -145,7 +145,7 @@ fn rays_meet_the_same_triangles_at_the_same_places_by_every_search() {
             println!("{name}: skipped brute, since the driver ends loops after {limit} iterations");
         }
         let mut tests = vec![TriangleTest::Watertight];
-        // With instances, each search rounds the way into the space of Havel's planes on its own.
+        // With instances, each search rounds the transform to the space of Havel's planes on its own.
         if name != "instances" {
             tests.push(TriangleTest::Havel);
         }
@@ -177,7 +177,7 @@ fn rays_meet_the_same_triangles_at_the_same_places_by_every_search() {
     }
 }
 
-/// A scene whose only object is this, in render space as it is.
+/// A scene with only this object, in render space.
 fn closed(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Scene {
     let mut scene = scene("furnace-closed");
     scene.normals = positions.iter().map(|position| position.normalize()).collect();
@@ -189,7 +189,7 @@ fn closed(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Scene {
     scene
 }
 
-/// A bipyramid: `angles` around its axis, seen from inside everywhere closed.
+/// A bipyramid with vertices at `angles` around its axis; closed when seen from inside.
 fn bipyramid(angles: &[f64]) -> Scene {
     let rim = angles.iter().map(|a| Vec3::new(a.cos() as f32, 0.013, a.sin() as f32));
     let positions: Vec<Vec3> = [Vec3::Y, Vec3::NEG_Y].into_iter().chain(rim).collect();
@@ -207,14 +207,14 @@ fn evenly(count: u32) -> Vec<f64> {
         .collect()
 }
 
-/// A thousand of them with an aspect of 10⁶ among wide ones.
+/// A thousand slivers with an aspect ratio of 10⁶ among wide triangles.
 fn slivers() -> Scene {
     let mut angles: Vec<f64> = (0..1000).map(|i| 1e-6 * f64::from(i)).collect();
     angles.extend(evenly(16).into_iter().skip(1));
     bipyramid(&angles)
 }
 
-/// Rays from near the middle to points of edges, every eighth to a corner itself.
+/// Rays from near the middle to points on edges, every eighth to a corner.
 fn rays_at_edges(scene: &Scene, count: u32) -> Box<dyn Iterator<Item = Ray>> {
     let edges: Vec<[Vec3; 2]> = scene
         .triangles
@@ -268,7 +268,7 @@ fn no_ray_passes_between_triangles_that_an_instance_puts_somewhere() {
     }
 }
 
-/// A closed surface as the only instance of its triangles, and a lamp far away.
+/// A closed surface as the only instance of its triangles, and a distant lamp.
 fn placed(closed: &Scene, placement: Placement) -> Scene {
     let mut scene = closed.clone();
     let count = scene.triangles.len() as u32;
@@ -316,7 +316,7 @@ fn no_ray_along_an_axis_passes() {
     let scene = bipyramid(&evenly(96));
     let corners = scene.positions.clone();
     assert_tight("rays along axes", &scene, || {
-        // From the plane through the middle: they meet corners and edges of the rim, and both tips, exactly.
+        // From the plane through the middle: they hit corners and edges of the rim, and both tips, exactly.
         let axes = corners.clone().into_iter().flat_map(|corner| {
             let axes: &[usize] = if corner.y.abs() == 1.0 { &[1] } else { &[0, 2] };
             axes.iter().map(move |&axis| (corner, axis))
@@ -333,7 +333,7 @@ fn no_ray_along_an_axis_passes() {
 
 #[test]
 fn no_grazing_ray_passes() {
-    // From a little above a wall of the room along it: the cosine to the wall's normal is 10⁻⁷ and less.
+    // Along a wall of the room from slightly above it: the cosine to the wall's normal is at most 10⁻⁷.
     let room = scene("furnace-closed");
     let (low, high) = room
         .positions

@@ -19,7 +19,7 @@ use ppm_vk::internals::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
 use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, Seen, object, photon, random_numbers, small, visible_point, xyz};
 
-/// Values of 1e-6 relative: the device keeps two f32 of each, 48 bits, but rounds the factors of eq. 2 to f32.
+/// Relative values of 1e-6: the device stores two f32 of each, 48 bits, but rounds the factors of eq. 2 to f32.
 const TOLERANCE: f64 = 1e-6;
 
 fn tiny() -> RenderConfig {
@@ -43,7 +43,7 @@ fn radius2(statistics: &Statistics) -> f64 {
 fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     const ITERATIONS: u32 = 10_000;
     let mut bench = Bench::new("cornell", tiny());
-    // Slot i lies on object i; so many photons arrive there in each iteration.
+    // Slot i lies on object i; this number of photons arrives there in each iteration.
     let arriving = |slot: u32| {
         if slot == 63 {
             0
@@ -59,7 +59,7 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
     }
     let mut statistics = vec![Statistics::of_radius2(0.01); 64];
     for (slot, statistics) in statistics.iter_mut().enumerate() {
-        // What came before: nothing, or so much that one photon changes less than the precision of an f32.
+        // Previous statistics: none, or so large that one photon changes less than the precision of an f32.
         let before: u64 = [0, 100_000_000, u64::from(u32::MAX) - 5][slot / 6 % 3];
         (statistics.accepted_low, statistics.accepted_high) = (before as u32, (before >> 32) as u32);
         statistics.flux_high = [before as f32, 0.0, 1.0, 0.0];
@@ -123,14 +123,14 @@ fn radii_and_flux_follow_equations_2_and_3_over_ten_thousand_iterations() {
             );
         }
     }
-    // The product of eq. 2 over the iterations, where nothing came before: N = α·i·M.
+    // The product of eq. 2 over the iterations, without previous statistics: N = α·i·M.
     let alpha = f64::from(bench.config.alpha);
     let ratio = |i: u32| (alpha * f64::from(i) + alpha) / (alpha * f64::from(i) + 1.0);
     let by_hand = 0.01 * (0..ITERATIONS).map(ratio).product::<f64>();
     let difference = relative_difference(radius2(&found[1]), by_hand);
     assert!(
         difference < TOLERANCE,
-        "R² {} after one photon a time, {by_hand} by hand",
+        "R² {} after one photon per iteration, {by_hand} by hand",
         radius2(&found[1])
     );
 }
@@ -179,11 +179,12 @@ fn radii_shrink_where_more_photons_than_wanted_were_found_but_not_below_a_part_o
 
 #[test]
 fn discs_follow_footprints_and_are_counted_in_their_shells() {
-    // Radii found automatically have bounds.
+    // Radii found automatically are bounded.
     let mut bench = Bench::new("cornell-spheres", small());
     let seen = bench.seen();
     let receivers = bench.renderer.sizes().receivers();
-    // Some slots see something for the first time; of the others a few have discs that are too large here, and bound the cells.
+    // Some slots see a surface for the first time; a few of the others have discs that are too large here, and determine the
+    // cells.
     let statistics: Vec<Statistics> = random_numbers(receivers)
         .map(|[u, v, ..]| match u {
             ..0.1 => 0.0,
@@ -263,7 +264,7 @@ fn discs_follow_footprints_and_are_counted_in_their_shells() {
     assert!(used >= 2, "one for each photon map at the least: {shells:?}");
 }
 
-/// What a cell has is what one of the visible points wants, and of all of them the most that any wants is among that.
+/// The demand of a cell is that of one of its visible points, and at least that of each of them.
 #[test]
 fn cells_want_photons_as_the_visible_points_do_that_reach_them() {
     for name in ["cornell-spheres", "glossy", "pool"] {
@@ -313,7 +314,7 @@ fn cells_want_photons_as_the_visible_points_do_that_reach_them() {
             let at = wanted.partition_point(|&wanted| wanted < f64::from(found) * (1.0 - 1e-4));
             let nearest = wanted.get(at).copied().unwrap_or(f64::INFINITY);
             agreement.note(relative_difference(found.into(), nearest) < 2e-4, || {
-                format!("{found} in a cell, the nearest that is wanted is {nearest}")
+                format!("{found} in a cell, the nearest demand is {nearest}")
             });
         }
         agreement.assert(&format!("what is wanted in {name}"), 0.999, 90);
@@ -329,7 +330,7 @@ fn cells_want_photons_as_the_visible_points_do_that_reach_them() {
     }
 }
 
-/// No disc has lost a photon where those that nobody wants are dropped.
+/// Dropping unwanted photons removes none from any disc.
 #[test]
 fn dropping_photons_that_nobody_wants_changes_nothing_that_is_gathered() {
     for name in ["cornell-spheres", "pool", "instances"] {
@@ -364,7 +365,7 @@ fn dropping_photons_that_nobody_wants_changes_nothing_that_is_gathered() {
 }
 
 #[test]
-fn updates_clear_what_was_gathered() {
+fn updates_clear_the_gathered_sums() {
     let mut bench = Bench::new("cornell-spheres", small());
     for (slot, gathered) in bench.download::<Gathered>(BufferId::GatheredOf).iter().enumerate() {
         assert_eq!(*gathered, Gathered::zeroed(), "slot {slot}");
@@ -395,7 +396,7 @@ fn pictures_are_resolved_by_equation_4() {
                 high: [d, 1e6 * c, b, if a < 0.7 { 3.0 * b } else { 0.0 }],
                 low: [0.0, 1e-2 * a, 0.0, if a < 0.9 { 2.0 } else { 0.0 }],
             });
-            // Of some nothing is known yet.
+            // Some have no coverage yet.
             coverage.push(Coverage {
                 covered: (16.0 * b) as u32,
                 asked: 16,
@@ -509,8 +510,8 @@ fn pictures_are_resolved_by_equation_4() {
     }
 }
 
-/// Each iteration's part of the picture is in the picture of its sequence, whatever has become of R since. What is known of a
-/// disc's cover, by which the picture alone is divided anew, changes: of that estimator the picture as a whole is the same.
+/// The radiance of each iteration is in the picture of its sequence, whatever R is later. Coverage, by which only the whole
+/// picture is divided anew, changes: for that estimator the whole picture is unchanged.
 #[test]
 fn the_pictures_of_the_sequences_are_together_the_picture() {
     const ITERATIONS: u32 = 6;

@@ -1,7 +1,7 @@
-//! The stage `camera`: where paths end that go straight to what they see, and what is gathered there.
+//! The stage `camera`: end points of paths that go straight to the visible surface, and their BSDFs.
 //!
-//! Tolerances: the kernels compute in f32, whose rounding (6e-8 of the coordinates, which lie within ±1) the ray's length and
-//! slope multiply a few times.
+//! Tolerances: the kernels compute in f32. Its rounding (6e-8 of coordinates within ±1) is multiplied a few times by the ray's
+//! length and slope.
 
 use ppm_vk::internals::config::RenderConfig;
 use ppm_vk::internals::cpu::{self, Receivers};
@@ -12,7 +12,7 @@ use ppm_vk::internals::stage::BufferId;
 use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, object, small, xyz};
 
-/// The last of the first iteration's paths of a pixel, whose visible points the buffers hold.
+/// The last camera path of a pixel in the first iteration, whose visible points the buffers hold.
 fn last_turn(config: &RenderConfig) -> CameraTurn {
     let first = CameraTurn::that_gathers(config, 0);
     first.others().last().unwrap_or(first)
@@ -33,7 +33,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
     let [width, _] = settings.resolution.map(|side| side as usize);
     let radii2 = vec![1.0; seen.points.len()];
     let gathering = seen.with(&radii2);
-    // The same ray goes straight to the same place.
+    // The same ray reaches the same point.
     let is_straight = |position: glam::DVec3, footprint: f64| {
         let way = position.distance(xyz(settings.camera_position));
         (footprint / (way * f64::from(settings.pixel_spread)) - 1.0).abs() < 1e-4
@@ -56,7 +56,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
         let normals = expected.bsdf.normals();
         let distance = position.distance(expected.surface.position);
         let material = &expected.surface.material;
-        // A step of the octahedral code turns a direction by 1.3e-4 rad at the most. A coat that was chosen has its own normal.
+        // A step of the octahedral code changes a direction by at most 1.3e-4 rad. A clear coat has its own normal.
         let mut turned = angle(found.geometric_normal, normals.geometric);
         if material.coat == 0.0 {
             turned = turned.max(angle(found.shading_normal, normals.shading));
@@ -65,7 +65,8 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
         places.note(same, || {
             format!("slot {slot}: {found:?} instead of {expected:?}, {distance:e} apart")
         });
-        // Where nothing was left to chance both gather all that the surface scatters. (Through a thin wall paths go straight too.)
+        // Without random choices both gather everything that the surface scatters. (Paths also pass straight through a thin
+        // wall.)
         if !same || expected.throughput != glam::DVec3::ONE || material.coat > 0.0 {
             continue;
         }
@@ -79,7 +80,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
             }
             let response = xyz(found.weight) * gathering.response(slot, l);
             let wanted = expected.bsdf.evaluate(cpu::Width::Wide, expected.viewer, l) / cosine;
-            // Reflectances and α are kept as f16, directions in 32 bits.
+            // Reflectances and α are stored as f16, directions in 32 bits.
             let difference = (0..3)
                 .map(|channel| relative_difference(response[channel], wanted[channel]))
                 .fold(0.0, f64::max);
@@ -97,7 +98,7 @@ fn assert_camera_agrees(name: &str, config: RenderConfig, least_seen: usize, lea
 }
 
 #[test]
-fn paths_that_go_straight_end_where_the_cpus_end_and_gather_what_those_gather() {
+fn straight_paths_end_at_the_cpus_points_and_gather_the_same() {
     for (name, least_seen, least_compared) in [
         ("cornell", 3500, 3000),
         ("cornell-spheres", 2000, 2000),
@@ -110,7 +111,7 @@ fn paths_that_go_straight_end_where_the_cpus_end_and_gather_what_those_gather() 
     }
 }
 
-/// What the limit ends is the reflection. Plain paths end at the base by chance, the kernels' all do.
+/// The bounce limit ends the reflection. The CPU's paths end at the base at random, the kernels' always do.
 #[test]
 fn the_bounce_limit_leaves_the_base_of_narrow_surfaces() {
     let config = RenderConfig {

@@ -18,23 +18,23 @@ pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The picture in `tests/references` that another renderer made of the scene of this name.
+/// The reference picture of this scene by another renderer, from `tests/references`.
 pub fn reference(name: &str) -> Image {
     let image = read_exr(&folder().join("tests/references").join(name).with_extension("exr")).expect("reference");
     remember(&format!("{name}-reference"), &image);
     image
 }
 
-/// Pictures that a test keeps in mind.
+/// Number of pictures that a test keeps.
 const REMEMBERED: usize = 6;
 
 thread_local! {
-    /// The last pictures that the test of this thread made or read.
+    /// The last pictures that the test of this thread rendered or read.
     static PICTURES: RefCell<VecDeque<(String, Image)>> = const { RefCell::new(VecDeque::new()) };
 }
 
-/// Has a picture written if its test fails: into `failed-pictures` in cargo's folder for what tests write, as PNG, with the names of the
-/// test and of the picture.
+/// Writes a picture if its test fails: into `failed-pictures` in cargo's folder for test output, as PNG, named after the test and
+/// the picture.
 pub fn remember(name: &str, image: &Image) {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -55,7 +55,7 @@ pub fn remember(name: &str, image: &Image) {
 fn write_remembered() {
     let test = std::thread::current().name().unwrap_or("test").replace("::", "-");
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("failed-pictures");
-    // A panic within a panic would end the process: what can't be written is told.
+    // A panic during a panic would abort the process: errors are printed.
     let pictures = PICTURES.try_with(|pictures| pictures.try_borrow_mut().map(|mut it| std::mem::take(&mut *it)));
     let pictures = pictures.ok().and_then(Result::ok).unwrap_or_default();
     for (number, (name, image)) in pictures.iter().enumerate() {
@@ -79,14 +79,14 @@ pub fn small(side: u32, photons: u32) -> RenderConfig {
     }
 }
 
-/// A scene that can be rendered.
+/// A scene prepared for rendering.
 pub struct Subject {
     pub scene: Scene,
     pub packed: PackedScene,
 }
 
 impl Subject {
-    /// The file of that name in `scenes/`.
+    /// The file of this name in `scenes/`.
     pub fn named(name: &str) -> Self {
         Self::at(&folder().join("scenes").join(name).with_extension("gltf"))
     }
@@ -105,7 +105,7 @@ impl Subject {
         Renderer::new(device, &self.packed, &self.scene.cameras[0], config).expect("renderer")
     }
 
-    /// A picture without NaN, infinity or negative value, of which no path was cut.
+    /// A picture without NaN, infinity or negative values, without cut paths.
     pub fn render(&self, iterations: u32, config: RenderConfig) -> Image {
         let mut renderer = self.renderer(config);
         for _ in 0..iterations {
@@ -114,7 +114,7 @@ impl Subject {
         self.clean_picture(&mut renderer)
     }
 
-    /// The picture so far, of which the same holds.
+    /// The current picture, with the same checks.
     pub fn clean_picture(&self, renderer: &mut Renderer) -> Image {
         let name = &self.scene.name;
         let image = renderer.resolve().expect("picture");

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// What `ppm-vk ARGUMENTS` does in a folder.
+/// Runs `ppm-vk ARGUMENTS` in a folder.
 pub fn ppm_vk(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ppm-vk"))
         .args(arguments)
@@ -12,7 +12,7 @@ pub fn ppm_vk(folder: &Path, arguments: &[&str]) -> Output {
         .expect("ppm-vk runs")
 }
 
-/// What it said to stderr.
+/// Its output to stderr.
 pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }

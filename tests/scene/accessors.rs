@@ -59,7 +59,7 @@ const CUBE: [u16; 36] = [
     0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6,
 ];
 
-/// A room whose floor is the cube with smooth normals, positions and normals in accessors that `add` makes.
+/// A room whose floor is the cube with smooth normals; `add` makes the accessors of positions and normals.
 fn cube_room(add: impl FnOnce(&mut Fixture) -> [usize; 2]) -> Fixture {
     let mut room = Fixture::room();
     let [positions, normals] = add(&mut room);
@@ -79,7 +79,7 @@ fn float_cube() -> Fixture {
     })
 }
 
-/// The cube's corners by the bytes of each coordinate, every element padded to a multiple of four as vertex attributes
+/// The cube's corners from the bytes of each coordinate; every element is padded to a multiple of four, as vertex attributes
 /// must be.
 fn encoded(encode: impl Fn(i8) -> Vec<u8>) -> Vec<u8> {
     let element = |corner: [i8; 3]| {
@@ -106,7 +106,7 @@ fn a_quantised_cube_is_the_cube_of_floats() {
     let wanted = float_cube().scene();
     assert_close(winding_normal(&wanted, 0), [-1.0, 0.0, 0.0]);
     assert_close(wanted.normals[0], Vec3::splat(-1.0).normalize().to_array());
-    // (component type, normalised, from −1 or 1 to bytes, translation and scale that undo it)
+    // (component type, normalised, from −1 or 1 to bytes, translation and scale that undo the quantisation)
     type Case = (u32, bool, fn(i8) -> Vec<u8>, [f64; 3], f64);
     let cases: [Case; 8] = [
         (5120, true, |at| vec![(127 * at) as u8], [0.0; 3], 1.0),
@@ -148,7 +148,7 @@ fn a_quantised_cube_is_the_cube_of_floats() {
         let scene = room.scene();
         assert_eq!(scene.warnings, [""; 0]);
         assert_eq!(scene.triangles, wanted.triangles);
-        // f32 holds the scale of the node to 6e-8 of it, 40000 of which are 2.
+        // f32 represents the scale of the node to a relative 6e-8; 40000 of them are 2.
         for (found, wanted) in scene.positions.iter().zip(&wanted.positions) {
             assert!(
                 found.abs_diff_eq(*wanted, 4e-7),

@@ -1,4 +1,4 @@
-//! How much memory a thread takes.
+//! Counts the memory of a thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -8,14 +8,14 @@ thread_local! {
     static PEAK: Cell<isize> = const { Cell::new(0) };
 }
 
-/// The system's allocator, with an account for each thread.
+/// The system's allocator, with a count for each thread.
 struct Counting;
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
 fn count(bytes: isize) {
-    // A thread that ends has no account any more.
+    // A thread that ends has no counter any more.
     let _ = TAKEN.try_with(|taken| {
         taken.set(taken.get() + bytes);
         PEAK.try_with(|peak| peak.set(peak.get().max(taken.get())))
@@ -26,7 +26,7 @@ fn count(bytes: isize) {
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size() as isize);
-        // SAFETY: the caller keeps what the trait asks for.
+        // SAFETY: the caller guarantees what the trait requires.
         unsafe { System.alloc(layout) }
     }
 
@@ -37,7 +37,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// What `action` returns, and the most bytes that this thread had beyond those before at any time of it.
+/// The result of `action`, and this thread's peak of allocated bytes above the level before.
 pub fn peak_of<T>(action: impl FnOnce() -> T) -> (T, usize) {
     let before = TAKEN.get();
     PEAK.set(before);

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close, assert_error, world_soup};
 
-/// Where the lamp's first corner is, which is (0, 1, 0) at rest.
+/// The lamp's first corner, which is (0, 1, 0) at rest.
 fn lamp_corner(scene: &Scene) -> Vec3 {
     world_soup(scene)[2][0]
 }
@@ -23,7 +23,7 @@ fn along_x(values: &[f32]) -> Vec<[f32; 3]> {
 }
 
 #[test]
-fn without_a_time_everything_is_at_rest_and_that_is_said() {
+fn without_a_time_everything_is_at_rest_with_a_warning() {
     let mut room = Fixture::room();
     let output = room.add_vectors(&along_x(&[0.5, 0.75]));
     room.animate(1, "translation", "LINEAR", &[0.0, 1.0], output);
@@ -74,7 +74,7 @@ fn cubic_splines_follow_their_tangents() {
 #[test]
 fn rotations_take_the_shorter_way_and_scales_follow() {
     let mut room = Fixture::room();
-    // A quarter turn about y, the quaternion's sign turned round: it is the same rotation.
+    // A quarter turn about y; the negated quaternion is the same rotation.
     let turned = -Quat::from_rotation_y(std::f32::consts::FRAC_PI_2);
     let rotations = [Quat::IDENTITY.to_array(), turned.to_array()].concat();
     let rotations = room.add_floats("VEC4", 4, &rotations);

@@ -1,4 +1,4 @@
-//! Files that others made. Where the folder that holds them isn't there, nothing is checked.
+//! Files made by others. Nothing is checked if their folder is missing.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close, winding_normal, world_soup};
 
-/// An asset with one buffer as a fixture, its first material a lamp; `None` if it isn't there.
+/// An asset with one buffer as a fixture, with its first material emissive; `None` if it is missing.
 fn asset(path: &str) -> Option<Fixture> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../shared/assets")
@@ -120,7 +120,7 @@ fn boxes_that_draco_compressed_are_cubes() {
 
 #[test]
 fn assets_that_are_there_are_read() {
-    // So that a folder that moved is noticed where it should be.
+    // So that a missing folder is noticed where it should exist.
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets");
     if assets.is_dir() {
         let fixture = asset("khr/SimpleSparseAccessor/SimpleSparseAccessor.gltf").expect("the asset");

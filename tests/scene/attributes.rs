@@ -6,7 +6,7 @@ use serde_json::json;
 
 use crate::fixture::{Fixture, assert_close};
 
-/// What a scene has for each vertex of the floor (four) and of the lamp (three).
+/// Attributes of the vertices of the floor (four) and of the lamp (three).
 fn assert_lengths(scene: &Scene, texcoords: usize, colors: usize, tangents: usize) {
     assert_eq!(scene.positions.len(), 7);
     assert_eq!(

@@ -1,4 +1,4 @@
-//! Cameras, and where there are none.
+//! Cameras, and scenes without a camera.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -41,7 +41,7 @@ fn a_camera_looks_along_minus_z_with_y_up() {
 #[test]
 fn a_camera_turns_with_its_node_and_parents() {
     let mut room = Fixture::room();
-    // A quarter turn about x lifts its gaze from −z to +y.
+    // A quarter turn about x turns its view from −z to +y.
     room.set("/nodes/2/rotation", json!([FRAC_1_SQRT_2, 0, 0, FRAC_1_SQRT_2]));
     assert_frame(
         &room.scene().cameras[0],
@@ -146,7 +146,7 @@ fn an_orthographic_camera_shows_twice_its_magnifications() {
 }
 
 #[test]
-fn a_lens_is_focused_on_the_centre_of_the_scene_or_where_it_is_told() {
+fn a_lens_is_focused_on_the_centre_of_the_scene_or_at_the_given_distance() {
     let scene = Fixture::room().scene();
     let camera = &scene.cameras[0];
     let scale = scene.normalisation.scale as f32;

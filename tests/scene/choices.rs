@@ -1,4 +1,4 @@
-//! What a file leaves to choose: material variants and scenes.
+//! Choices that a file leaves: material variants and scenes.
 
 use ppm_vk::LoadChoice;
 use ppm_vk::internals::error::Result;
@@ -10,7 +10,7 @@ use crate::fixture::{Fixture, assert_error};
 
 const VARIANTS: &str = "KHR_materials_variants";
 
-/// A room with a second scene, the lamp alone, and variants of the floor.
+/// A room with a second scene, only the lamp, and variants of the floor.
 fn room() -> Fixture {
     let mut room = Fixture::room();
     room.set("/extensionsUsed", json!([VARIANTS]));
@@ -140,7 +140,7 @@ fn a_scene_that_shows_no_mesh_gives_way_to_one_that_does() {
             "{:?}",
             scene.warnings
         );
-        // What is asked for is what is tried.
+        // Only the requested one is tried.
         assert_error(load(&room, None, Some("0")), &["no triangles"]);
     }
     with_scenes(json!([{}, {"nodes": [2]}]), Some(0)).assert_fails(&["no triangles"]);

@@ -14,7 +14,7 @@ fn assert_same(scene: &Scene, other: &Scene) {
 }
 
 #[test]
-fn compressed_views_are_what_they_were() {
+fn compressed_views_are_restored() {
     let mut room = meshopt_room();
     let plain = Fixture::room().scene();
     let scene = room.scene();

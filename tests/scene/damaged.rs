@@ -1,10 +1,10 @@
-//! Accessors, indices and vertices that are not what they say.
+//! Accessors, indices and vertices with invalid values.
 
 use serde_json::{Value, json};
 
 use crate::fixture::Fixture;
 
-/// Checks what changing one value of the room makes loading say.
+/// Checks the message after changing one value of the room.
 #[track_caller]
 fn assert_change_fails(pointer: &str, value: Value, parts: &[&str]) {
     let mut room = Fixture::room();

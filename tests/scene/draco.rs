@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::encoded::{Attribute, DRACO, EDGEBREAKER, SEQUENTIAL, VALENCE, add_compressed, draco_room, encode};
 use crate::fixture::{Fixture, soup};
 
-/// The corners of all triangles, each triangle from its least corner on, in one order.
+/// The corners of all triangles, each starting from its least corner, sorted.
 fn sorted(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
     let round = |corner: glam::Vec3| (corner * 1000.0).round().as_ivec3().to_array();
     let mut triangles: Vec<_> = soup(scene)
@@ -24,7 +24,7 @@ fn sorted(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
 }
 
 #[test]
-fn compressed_primitives_are_what_they_were() {
+fn compressed_primitives_are_restored() {
     let plain = sorted(&Fixture::room().scene());
     for method in [SEQUENTIAL, EDGEBREAKER, VALENCE] {
         for quantized in [false, true] {
@@ -98,7 +98,7 @@ fn small_integers_are_decompressed_too() {
 }
 
 #[test]
-fn plain_data_stands_for_what_cannot_be_decompressed_and_that_is_said() {
+fn plain_data_replaces_data_that_cannot_be_decompressed_with_a_warning() {
     let plain = sorted(&Fixture::room().scene());
     let mut room = Fixture::room();
     add_compressed(&mut room, b"DRACO, but no more than that");
@@ -128,7 +128,7 @@ fn damaged_compression_is_named() {
 
 #[test]
 fn a_few_bytes_that_stand_for_many_vertices_take_no_more_memory_than_they_may() {
-    // Equal vertices are compressed to next to nothing, whatever their number: here 4 MiB a primitive.
+    // Equal vertices are compressed to almost nothing, whatever their number: here 4 MiB per primitive.
     let positions = vec![0; 12 << 20];
     let attribute = Attribute {
         kind: GeometryAttributeType::Position,

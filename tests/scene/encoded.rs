@@ -1,4 +1,4 @@
-//! Inputs that are compressed, for the tests that read them and those that damage them.
+//! Compressed inputs, for the tests that read them and those that damage them.
 
 use draco_core::{DataType, EncoderBuffer, EncoderOptions, GeometryAttributeType, Mesh, MeshEncoder, PointAttribute};
 use serde_json::json;
@@ -47,7 +47,7 @@ pub fn meshopt_room() -> Fixture {
 /// Compresses primitives.
 pub const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Encodings: triangle by triangle, along their edges, and the same in the way of high compression.
+/// Encodings: sequential, edgebreaker, and edgebreaker with valence.
 pub const SEQUENTIAL: i32 = 0;
 pub const EDGEBREAKER: i32 = 1;
 pub const VALENCE: i32 = 2;
@@ -91,7 +91,7 @@ pub fn encode(attributes: &[Attribute<'_>], triangles: &[[u32; 3]], method: i32,
     encoded.data().to_vec()
 }
 
-/// The room whose floor is there compressed alone.
+/// The room whose floor has only compressed data.
 pub fn draco_room(method: i32, quantized: bool) -> Fixture {
     let mut room = Fixture::room();
     let (positions, normals) = (room.binary[..48].to_vec(), room.binary[48..96].to_vec());
@@ -114,7 +114,7 @@ pub fn draco_room(method: i32, quantized: bool) -> Fixture {
     room
 }
 
-/// Gives the floor compressed data besides what it has.
+/// Adds compressed data to the floor, which keeps its own.
 pub fn add_compressed(room: &mut Fixture, encoded: &[u8]) {
     let accessor = room.add_accessor(encoded, encoded.len(), 5121, "SCALAR");
     let view = room.json["accessors"][accessor]["bufferView"].clone();

@@ -1,4 +1,4 @@
-//! The ways in which a scene may be spread over files.
+//! How a scene can be distributed over files.
 
 use std::fs;
 use std::path::Path;
@@ -62,7 +62,7 @@ fn relative_uris_may_lead_up_and_have_a_query() {
         room.load_bytes("scene/room.gltf", room.json.to_string().as_bytes())
             .expect(uri);
     }
-    // Both are names as well.
+    // Both are valid names.
     room.write("what?#.bin", &room.binary);
     room.set("/buffers/0/uri", json!("../what?#.bin"));
     room.load_bytes("scene/room.gltf", room.json.to_string().as_bytes())
@@ -223,7 +223,7 @@ fn wrong_lengths_in_a_glb_are_refused() {
     assert_error(with_word(12, 8), &["damaged .glb"]);
     assert_error(with_word(16, 0), &["first chunk isn't JSON"]);
     assert_error(with_word(20 + json_length as usize, u32::MAX), &["damaged .glb"]);
-    // A binary chunk of another type counts as none.
+    // A binary chunk of another type is ignored.
     assert_error(
         with_word(24 + json_length as usize, 0),
         &["buffer 0", "no binary chunk"],
@@ -250,7 +250,7 @@ fn names_with_line_ends_and_megabytes_keep_messages_to_a_line() {
     assert!(room.scene().objects[0].name.len() < 200, "names are cut");
 }
 
-/// Where the project's shared scenes lie beside the checkout, all must load or say why not.
+/// The project's shared scenes, if they exist, must all load or say why not.
 #[test]
 fn the_shared_scenes_load() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
@@ -272,9 +272,9 @@ fn the_shared_scenes_load() {
     }
 }
 
-/// JSON schema's integers include 5126.0, null members are those of careless exporters, and `extras` may be of any type.
+/// JSON schema's integers include 5126.0; some exporters write null members; `extras` may be of any type.
 #[test]
-fn what_the_schema_allows_to_be_written_in_several_ways_loads_alike() {
+fn equivalent_spellings_of_the_schema_load_alike() {
     let plain = Fixture::room().scene();
     for extras in [
         json!("text"),
@@ -322,7 +322,7 @@ fn a_version_that_is_a_number_and_a_value_of_a_wrong_type_are_named_with_their_p
 }
 
 #[test]
-fn padding_that_is_counted_but_not_there_is_told() {
+fn padding_that_is_counted_but_missing_is_reported() {
     let mut room = Fixture::room();
     let length = room.binary.len();
     room.set("/buffers/0/byteLength", json!(length + 3));

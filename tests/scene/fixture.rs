@@ -12,7 +12,7 @@ use ppm_vk::internals::scene::{Environment, Scene};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// A glTF file in the making. Its buffer is `binary`; everything else is in `json`.
+/// A glTF file under construction. Its buffer is `binary`; everything else is in `json`.
 pub struct Fixture {
     pub json: Value,
     pub binary: Vec<u8>,
@@ -22,7 +22,7 @@ pub struct Fixture {
 impl Fixture {
     /// A floor of two triangles (node, mesh and material 0), a lamp of one (1) above it, and a camera (node 2).
     ///
-    /// Bounds: −1 to 1 along x and z, 0 to 1 along y. The lamp's area is ½. Nothing in it gives rise to a warning.
+    /// Bounds: −1 to 1 along x and z, 0 to 1 along y. The lamp's area is ½. It loads without warnings.
     pub fn room() -> Self {
         let mut room = Self {
             json: json!({
@@ -61,7 +61,7 @@ impl Fixture {
         room
     }
 
-    /// The room without its floor and camera: a lamp alone, node 0, of one triangle with an area of ½.
+    /// The room without floor and camera: only the lamp, node 0, one triangle with an area of ½.
     pub fn lamp() -> Self {
         let mut lamp = Self::room();
         lamp.set("/scenes/0/nodes", json!([0]));
@@ -69,7 +69,7 @@ impl Fixture {
         lamp
     }
 
-    /// Sets what a JSON pointer names. The last part may be a new key, or `-` for a new element.
+    /// Sets the value at a JSON pointer. The last part may be a new key, or `-` for a new element.
     pub fn set(&mut self, pointer: &str, value: Value) -> &mut Self {
         let (parent, key) = pointer.rsplit_once('/').expect("a pointer with a slash");
         match self.json.pointer_mut(parent) {
@@ -83,7 +83,7 @@ impl Fixture {
         self
     }
 
-    /// Removes a key that is there.
+    /// Removes an existing key.
     pub fn remove(&mut self, pointer: &str) -> &mut Self {
         let (parent, key) = pointer.rsplit_once('/').expect("a pointer with a slash");
         let parent = self.json.pointer_mut(parent).and_then(Value::as_object_mut);
@@ -104,7 +104,7 @@ impl Fixture {
         self.add_accessor(&bytes, indices.len(), 5123, "SCALAR")
     }
 
-    /// Adds an accessor with a view of its own, and returns its index.
+    /// Adds an accessor with its own view, and returns its index.
     pub fn add_accessor(&mut self, bytes: &[u8], count: usize, component: u32, kind: &str) -> usize {
         let view = self.json["bufferViews"].as_array().expect("bufferViews").len();
         let accessor = self.json["accessors"].as_array().expect("accessors").len();
@@ -180,7 +180,7 @@ impl Fixture {
 
     /// Writes a file into the folder.
     pub fn write(&self, name: &str, bytes: &[u8]) {
-        // Some file systems wait for the disk when a file is overwritten, which thousands of loads would add up.
+        // Some file systems wait for the disk when a file is overwritten, which would be slow for thousands of loads.
         let _ = fs::remove_file(self.path(name));
         fs::write(self.path(name), bytes).expect("a file in the temporary folder");
     }
@@ -197,7 +197,7 @@ impl Fixture {
         self.load_bytes("room.gltf", self.json.to_string().as_bytes())
     }
 
-    /// Writes a file into the folder and loads it as a scene at a time.
+    /// Writes a file into the folder and loads it at a time of its animations.
     pub fn load_bytes_at(&self, name: &str, bytes: &[u8], time: f64) -> Result<Scene> {
         self.write(name, bytes);
         let options = LoadOptions {
@@ -207,7 +207,7 @@ impl Fixture {
         Scene::load_with(&self.path(name), options)
     }
 
-    /// Loads it as it is at a time.
+    /// Loads it at a time of its animations.
     pub fn load_at(&self, time: f64) -> Result<Scene> {
         self.write("room.bin", &self.binary);
         self.load_bytes_at("room.gltf", self.json.to_string().as_bytes(), time)
@@ -245,7 +245,7 @@ impl Fixture {
         )
     }
 
-    /// Loads it with so many bytes of memory at the most.
+    /// Loads it with a memory limit in bytes.
     pub fn load_within(&self, memory_limit: u64) -> Result<Scene> {
         self.write("room.bin", &self.binary);
         self.write("room.gltf", self.json.to_string().as_bytes());
@@ -256,7 +256,7 @@ impl Fixture {
         Scene::load_with(&self.path("room.gltf"), options)
     }
 
-    /// The same, with an environment around it.
+    /// The same, with an environment.
     pub fn load_under(&self, environment: Environment) -> Result<Scene> {
         self.load_with(LoadOptions {
             environment: Some(environment),
@@ -320,14 +320,14 @@ impl Fixture {
         scene
     }
 
-    /// Checks that loading fails with a line that has all these parts.
+    /// Checks that loading fails with a line that contains all these parts.
     #[track_caller]
     pub fn assert_fails(&self, parts: &[&str]) {
         assert_error(self.load(), parts);
     }
 }
 
-/// Checks that a scene failed to load with one line that names the file and has all these parts.
+/// Checks that a scene failed to load with one line that names the file and contains all these parts.
 #[track_caller]
 pub fn assert_error(result: Result<Scene>, parts: &[&str]) {
     let error = match result {
@@ -373,7 +373,7 @@ pub fn world_soup(scene: &Scene) -> Vec<[Vec3; 3]> {
     soup(scene).into_iter().map(|corners| corners.map(world)).collect()
 }
 
-/// The normal that the order of a triangle's corners gives.
+/// The normal given by the order of a triangle's corners.
 pub fn winding_normal(scene: &Scene, triangle: usize) -> Vec3 {
     let [a, b, c] = scene.triangles[triangle]
         .vertices

@@ -63,7 +63,7 @@ fn the_shared_scene_moved_or_scaled_gives_the_same_numbers() {
         let path = folder.join(format!("cornell-spheres-{variant}.gltf"));
         let scene = Scene::load(&path).expect("a shared scene loads");
         let difference = difference(&scene, &original);
-        // Where the camera stands, 3.9, a step of f32 is 2.4e-7.
+        // At the camera, 3.9, a step of f32 is 2.4e-7.
         assert!(difference <= 2.4e-7, "{variant}: {difference}");
     }
 }
@@ -99,7 +99,7 @@ fn indices_of_8_16_and_32_bits_and_none_give_the_same_triangles() {
 
 #[test]
 fn strips_and_fans_face_the_way_of_their_first_triangle() {
-    // A square of which each order makes two triangles that face +y.
+    // A square; each order gives two triangles that face +y.
     let square = [[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [1.0, 0.0, 1.0]];
     for (mode, order) in [(5, [0, 1, 2, 3]), (6, [0, 1, 3, 2])] {
         for is_indexed in [false, true] {
@@ -207,7 +207,7 @@ fn interleaved_attributes_are_read_by_their_stride() {
         }
         bytes.extend_from_slice(&[0xff; 4]);
     }
-    // The padding after the last element need not be there.
+    // The padding after the last element may be missing.
     bytes.truncate(bytes.len() - 4);
     let positions = room.add_accessor(&bytes, 4, 5126, "VEC3");
     let view = room.json["accessors"][positions]["bufferView"].clone();
@@ -251,7 +251,7 @@ fn vertices_are_shared_where_the_file_shares_them_and_left_out_where_unused() {
 #[test]
 fn missing_normals_are_flat() {
     let mut room = Fixture::room();
-    // A ridge: two triangles that share an edge and face different ways.
+    // A ridge: two triangles that share an edge and face different directions.
     let positions = room.add_vectors(&[[-1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, -1.0], [1.0, 0.0, 0.0]]);
     let indices = room.add_indices(&[0, 1, 2, 3, 2, 1]);
     room.set(
@@ -278,7 +278,7 @@ fn normals_are_made_unit_and_follow_the_inverse_transpose() {
     let normals = room.add_vectors(&[[3.0, 3.0, 0.0]; 4]);
     room.set("/meshes/0/primitives/0/attributes/NORMAL", json!(normals));
     assert_close(room.scene().normals[0], [FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0]);
-    // A normal of slope 1 on what is stretched fourfold along x: its x shrinks to a quarter.
+    // A normal of slope 1 on a surface stretched fourfold along x: its x shrinks to a quarter.
     room.set("/nodes/0/scale", json!([4, 1, 1]));
     assert_close(
         room.scene().normals[0],
@@ -304,7 +304,7 @@ fn a_mirrored_node_keeps_its_front_in_front() {
         let wanted = (tilted / Vec3::from(scale.map(|factor| factor as f32))).normalize();
         assert_close(scene.normals[0], wanted.to_array());
     }
-    // Mirrored along y, the front of the floor looks down.
+    // Mirrored along y, the front of the floor faces down.
     let mut room = Fixture::room();
     room.set("/nodes/0/scale", json!([1, -1, 1]));
     let scene = room.scene();
@@ -358,7 +358,7 @@ fn triangles_that_rounding_to_f32_flattens_are_dropped() {
     room.add_root(json!({"name": "speck", "mesh": 1, "scale": [1e-12, 1e-12, 1e-12], "translation": [0.9, 0.9, 0.9]}));
     let scene = room.assert_warns(&["dropped 1 triangles", "\"speck\" (1)"]);
     assert_eq!(scene.objects.len(), 2, "an object of which nothing is left is none");
-    // A scene that consists of such triangles alone is as good as any.
+    // A scene of only such triangles is valid.
     let mut lamp = Fixture::lamp();
     lamp.set("/nodes/0/scale", json!([1e-12, 1e-12, 1e-12]));
     lamp.set("/nodes/0/translation", json!([0, 0.1, 0]));

@@ -116,7 +116,7 @@ fn damaged_instances_are_named() {
         |room| json!({"ROTATION": room.add_floats("VEC4", 4, &[0.0; 4])}),
         &["rotation of instance 0"],
     );
-    // Beside the extent of floating-point numbers: the position, not the place, is named.
+    // Next to the limits of f32: the message names the position, not the transform.
     let mut room = Fixture::room();
     let scales = room.add_vectors(&[[3e38; 3]]);
     instanced(&mut room, json!({"SCALE": scales}));
@@ -125,7 +125,7 @@ fn damaged_instances_are_named() {
 }
 
 #[test]
-fn a_skin_puts_its_mesh_in_one_place_and_that_is_said() {
+fn a_skin_puts_its_mesh_in_one_place_with_a_warning() {
     let mut room = Fixture::room();
     let translations = room.add_vectors(&[[0.0; 3], [0.0, 0.5, 0.0]]);
     instanced(&mut room, json!({"TRANSLATION": translations}));
@@ -141,7 +141,7 @@ fn a_skin_puts_its_mesh_in_one_place_and_that_is_said() {
 }
 
 #[test]
-fn triangles_that_vanish_in_all_instances_are_told_once() {
+fn triangles_that_vanish_in_all_instances_are_reported_once() {
     let mut room = Fixture::room();
     let translations = room.add_vectors(&[[0.0; 3], [0.0, 0.5, 0.0], [0.0, 0.25, 0.0]]);
     instanced(&mut room, json!({"TRANSLATION": translations}));

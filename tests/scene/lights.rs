@@ -48,7 +48,7 @@ fn every_instance_of_a_light_emits() {
 }
 
 #[test]
-fn a_scene_without_light_is_lit_by_radiance_1_from_all_around_and_says_so() {
+fn a_scene_without_light_is_lit_by_radiance_1_from_all_around_with_a_note() {
     let mut unlit = Fixture::room();
     unlit.set("/materials/1/emissiveFactor", json!([0, 0, 0]));
     let mut without_lamp = Fixture::room();
@@ -68,7 +68,7 @@ fn a_scene_without_light_is_lit_by_radiance_1_from_all_around_and_says_so() {
     assert_eq!(Fixture::room().scene().environment, None);
 }
 
-/// The room with a lamp of so many texels along a side, white ones where `shines`.
+/// The room with a lamp of this number of texels along a side, white where `shines`.
 fn room_with_texels(side: u32, shines: impl Fn(u32, u32) -> bool) -> Fixture {
     let mut room = Fixture::room();
     let image = image::RgbaImage::from_fn(side, side, |x, y| image::Rgba([if shines(x, y) { 255 } else { 0 }; 4]));
@@ -83,8 +83,8 @@ fn room_with_texels(side: u32, shines: impl Fn(u32, u32) -> bool) -> Fixture {
     room
 }
 
-/// One texel of 4,096 shines, blended with its neighbours: nearly all choices go to parts of the lamp that it reaches, and
-/// none to the others, though together they are all of the lamp.
+/// One texel of 4,096 emits, interpolated with its neighbours: nearly all choices go to parts of the lamp that it reaches, and
+/// none to the others, though together they are the whole lamp.
 #[test]
 fn a_lamp_is_chosen_by_its_bright_texel() {
     let room = room_with_texels(64, |x, y| [x, y] == [20, 9]);
@@ -107,9 +107,9 @@ fn a_lamp_is_chosen_by_its_bright_texel() {
     );
 }
 
-/// What shines evenly is one light, and so is what is dark: it has its turn all the same.
+/// A uniform emitter is one light, and so is a dark one, which still has a probability.
 #[test]
-fn a_lamp_that_shines_evenly_has_no_parts() {
+fn a_uniform_lamp_has_no_parts() {
     for is_bright in [true, false] {
         let scene = room_with_texels(64, |_, _| is_bright).scene();
         let packed = PackedScene::new(&scene).expect("a hierarchy");
@@ -122,9 +122,9 @@ fn a_lamp_that_shines_evenly_has_no_parts() {
     }
 }
 
-/// Of 1,024² texels every seventh shines: parts are larger than those, and it is said.
+/// Of 1,024² texels every seventh emits: parts are larger than those, and a message says so.
 #[test]
-fn a_lamp_of_too_many_texels_has_coarser_parts_and_it_is_said() {
+fn a_lamp_of_too_many_texels_has_coarser_parts_with_a_note() {
     let scene = room_with_texels(1024, |x, y| (x + 3 * y) % 49 == 0).scene();
     let packed = PackedScene::new(&scene).expect("a hierarchy");
     assert_eq!(packed.lights.len(), 256 * 256);
@@ -156,7 +156,7 @@ fn punctual_lights_stand_where_their_nodes_are_and_shine_along_minus_z() {
         json!({"type": "spot"}),
         json!({"type": "point", "intensity": 0}),
     ]);
-    // Straight down; a node's scale is no part of an intensity.
+    // Straight down; a node's scale does not affect an intensity.
     let half = 0.5_f64.sqrt();
     for node in [4, 5] {
         room.set(&format!("/nodes/{node}/rotation"), json!([-half, 0, 0, half]));
@@ -166,7 +166,7 @@ fn punctual_lights_stand_where_their_nodes_are_and_shine_along_minus_z() {
     let [point, spot, sun, default_spot] = scene.lights[..] else {
         panic!("{:?}", scene.lights);
     };
-    // The bounds of what has triangles are centred half a unit up, and scaled by 1.
+    // The bounds of the triangles are centred half a unit up, and scaled by 1.
     let place = Vec3::new(0.0, 1.5, 0.0);
     assert_eq!(point.kind, LightKind::Point);
     assert_eq!((point.position, point.intensity), (place, Vec3::new(8.0, 4.0, 2.0)));
@@ -191,7 +191,7 @@ fn punctual_lights_stand_where_their_nodes_are_and_shine_along_minus_z() {
     assert!(inner == 0.0 && (outer - (1.0 - (PI / 4.0).cos())).abs() < 1e-7);
 }
 
-/// Irradiance stays as it is when lengths are scaled: so intensities scale with their squares.
+/// Irradiance does not change when lengths are scaled: intensities scale with their squares.
 #[test]
 fn intensities_and_ranges_are_in_render_units() {
     let mut room = room_with(&[
@@ -240,7 +240,7 @@ fn damaged_punctual_lights_are_named() {
     room.assert_warns(&["light 0", "direction", "skipped"]);
 }
 
-/// Lights too dim or small to be chosen by their flux have their turn: the chances of all of them sum up to 1.
+/// Lights too dim or small to be chosen by their flux are still chosen: all probabilities sum up to 1.
 #[test]
 fn every_light_has_a_share_of_the_choices() {
     let mut room = room_with(&[
@@ -251,7 +251,7 @@ fn every_light_has_a_share_of_the_choices() {
     let scene = room.load_under(Environment::constant(Vec3::ONE)).expect("a scene");
     let packed = PackedScene::new(&scene).expect("a hierarchy");
     assert_eq!(packed.lights.len(), 5);
-    // A tenth of the choices goes to the two lamps, the two punctual lights and the environment alike.
+    // A tenth of the choices is distributed equally to the two lamps, the two punctual lights and the environment.
     assert!(
         packed.lights.iter().all(|light| light.probability >= 0.1 / 5.0),
         "{:?}",
@@ -261,9 +261,9 @@ fn every_light_has_a_share_of_the_choices() {
     assert!((sum - 1.0).abs() < 1e-6, "{sum}");
 }
 
-/// Blender's exporter multiplies lamps by 683 in its default units, and not what emits.
+/// Blender's exporter multiplies lamps by 683 in its default units, but not emissive surfaces.
 #[test]
-fn lamps_of_blenders_exporter_are_divided_by_683_and_it_is_said() {
+fn lamps_of_blenders_exporter_are_divided_by_683_with_a_note() {
     let lights = [
         json!({"type": "point", "intensity": 6830}),
         json!({"type": "directional", "intensity": 683}),

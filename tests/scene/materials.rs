@@ -1,4 +1,4 @@
-//! Materials: what is supported, what is named in a warning, and what is refused.
+//! Materials: which are supported, which cause a warning, and which are refused.
 
 use glam::Vec3;
 use ppm_vk::internals::scene::{Dielectric, Material, Surface};
@@ -41,7 +41,7 @@ fn glass(extensions: Value) -> Value {
     material
 }
 
-/// The floor's material as it is loaded, without any warning.
+/// The floor's material after loading, without warnings.
 #[track_caller]
 fn loaded(material: Value) -> Material {
     let mut scene = floor_of(material).scene();
@@ -227,7 +227,7 @@ fn with_sheen(mut material: Value, sheen: Value) -> Value {
 }
 
 #[test]
-fn a_sheen_is_what_the_file_says() {
+fn a_sheen_has_the_values_of_the_file() {
     let sheen = json!({"sheenColorFactor": [0.25, 0.5, 1], "sheenRoughnessFactor": 0.75});
     let mirror = json!({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}});
     for material in [matte(json!({})), mirror] {
@@ -236,13 +236,13 @@ fn a_sheen_is_what_the_file_says() {
         let sheen = material.layers.sheen;
         assert_eq!((sheen.color, sheen.roughness), (Vec3::new(0.25, 0.5, 1.0), 0.75));
     }
-    // Its colour is black unless the file gives one.
+    // Its colour is black unless the file sets one.
     let none = loaded(with_sheen(matte(json!({})), json!({"sheenRoughnessFactor": 0.5})));
     assert_eq!(none.surface, Surface::Matte);
 }
 
 #[test]
-fn sheens_that_cannot_be_are_refused_or_told_of() {
+fn invalid_sheens_are_refused_or_reported() {
     let refused = [
         (json!({"sheenColorFactor": [0, -1, 0]}), "sheenColorFactor is 0 -1 0"),
         (json!({"sheenRoughnessFactor": -1}), "sheenRoughnessFactor is -1"),
@@ -271,7 +271,7 @@ fn a_coat_lies_on_any_surface() {
         assert_eq!((coat.factor, coat.roughness), (0.5, 0.25));
     }
     assert_eq!(loaded(mirror).layers.coat.factor, 0.0);
-    // What is Lambertian without a coat has the microfacets of none below it.
+    // A Lambertian surface without a coat has no microfacets.
     match coat(matte(json!({}))).surface {
         Surface::Glossy(gloss) => assert_eq!((gloss.specular_f0, gloss.specular_f90), (Vec3::ZERO, 0.0)),
         surface => panic!("{surface:?}"),
@@ -323,7 +323,7 @@ fn glass_may_be_rough_a_thin_wall_a_part_of_a_surface_and_absorbing() {
     });
     assert!(dielectric(&loaded(without_volume)).thin);
 
-    // The kernels mix metal and transmission: textures may change both.
+    // The kernels mix metal and transmission, because textures may change both.
     let mut half = glass(json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}}));
     half["pbrMetallicRoughness"]["metallicFactor"] = json!(0.5);
     let half = dielectric(&loaded(half));
@@ -346,7 +346,7 @@ fn absorption_that_absorbs_nothing_is_no_reason_to_warn() {
 
 /// KHR_materials_ior and KHR_materials_specular; metal is mixed in by the kernels.
 #[test]
-fn what_is_neither_matte_nor_a_mirror_is_glossy() {
+fn surfaces_that_are_neither_matte_nor_mirrors_are_glossy() {
     let glossy = |material: Value| match loaded(material).surface {
         Surface::Glossy(gloss) => gloss,
         surface => panic!("{surface:?}"),
@@ -361,7 +361,7 @@ fn what_is_neither_matte_nor_a_mirror_is_glossy() {
         "KHR_materials_specular": {"specularFactor": 0.5, "specularColorFactor": [1, 0.5, 20]}
     }}));
     assert_eq!((half.metallic, half.roughness), (0.5, 0.75));
-    // Of index 2 a ninth is reflected; a colour can't make that more than everything.
+    // With index 2 a ninth is reflected; a colour cannot increase that above 1.
     assert_close(half.specular_f0, [0.5 / 9.0, 0.25 / 9.0, 0.5]);
     assert_eq!(half.specular_f90, 0.5);
 

@@ -1,4 +1,4 @@
-//! What a scene may take of memory in all.
+//! The memory limit of a scene.
 
 use ppm_vk::internals::film::Image;
 use ppm_vk::internals::loader::LoadOptions;
@@ -8,7 +8,7 @@ use serde_json::json;
 use crate::fixture::Fixture;
 use crate::textures::with_images;
 
-/// The smallest limit that a scene loads with, and what is said of the largest that it doesn't.
+/// The smallest limit that a scene loads with, and the message for the largest that it does not load with.
 fn least_limit(room: &Fixture, environment: Option<&Environment>) -> (u64, String) {
     let load = |memory_limit| {
         room.load_with(LoadOptions {
@@ -29,7 +29,7 @@ fn least_limit(room: &Fixture, environment: Option<&Environment>) -> (u64, Strin
     (enough, load(too_small).expect_err("less than the least").to_string())
 }
 
-/// Adds a mesh of so many vertices, each of which a triangle of its own shows.
+/// Adds a mesh of this number of vertices, each used by a triangle of its own.
 fn add_strip(room: &mut Fixture, vertices: u16) {
     let place = |index: u16| f32::from(index) / f32::from(vertices);
     let positions: Vec<[f32; 3]> = (0..vertices)
@@ -82,7 +82,7 @@ fn buffers_geometry_images_and_the_environment_are_added_up_to_one_limit() {
     let before = with_a_strip.binary.len();
     add_strip(&mut with_a_strip, VERTICES);
     let in_buffers = (with_a_strip.binary.len() - before) as u64;
-    // Positions and normals, and three indices and a material for each triangle at the least.
+    // At least positions and normals, and three indices and a material for each triangle.
     let as_geometry = u64::from(VERTICES) * (24 + 12);
     let (with_a_strip, _) = least_limit(&with_a_strip, None);
     assert!(

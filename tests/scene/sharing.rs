@@ -1,4 +1,4 @@
-//! Which primitives nodes share.
+//! Which primitives are shared by nodes.
 
 use glam::Vec3;
 use ppm_vk::internals::scene::{SHARED, Scene};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::fixture::{Fixture, assert_close};
 
-/// A fan of so many triangles: mesh 2 of the room. Returns the accessor of its positions.
+/// A fan of this number of triangles: mesh 2 of the room. Returns the accessor of its positions.
 fn add_fan(room: &mut Fixture, triangles: u16, material: usize) -> usize {
     let rim = (0..=triangles).map(|i| {
         let angle = f32::from(i) * 0.1;
@@ -88,7 +88,7 @@ fn bounds_and_areas_are_those_of_meshes_of_their_own() {
 }
 
 #[test]
-fn what_nodes_show_differently_is_not_shared() {
+fn meshes_that_nodes_show_differently_are_not_shared() {
     let two = || with_two(json!({}), json!({"translation": [0.5, 0, 0]}));
     assert_eq!(placed(&two().scene()), 2, "but for what follows");
 
@@ -118,7 +118,7 @@ fn what_nodes_show_differently_is_not_shared() {
 }
 
 #[test]
-fn what_saves_little_is_not_shared() {
+fn meshes_whose_sharing_saves_little_are_not_shared() {
     let mut room = with_two(json!({}), json!({"translation": [0.5, 0, 0]}));
     add_fan(&mut room, 190, 0);
     room.add_root(json!({"mesh": 3}));
@@ -145,7 +145,7 @@ fn few_triangles_and_flat_or_tiny_instances_have_triangles_of_their_own() {
     }
 }
 
-/// One vertex far away makes the scene so large that nothing of it is left, though the fan has triangles in its own space.
+/// One distant vertex makes the scene so large that the fan vanishes in it, though the fan has triangles in its own space.
 #[test]
 fn a_scene_whose_shared_triangles_vanish_with_all_others_is_refused() {
     let mut room = Fixture::room();

@@ -1,4 +1,4 @@
-//! Glass without a volume: thin by the specification, solid by `LoadOptions::solid_glass` where its mesh is closed.
+//! Glass without a volume: thin by the specification, or solid by `LoadOptions::solid_glass` if its mesh is closed.
 
 use ppm_vk::internals::loader::LoadOptions;
 use ppm_vk::internals::scene::{Dielectric, Scene, Surface};
@@ -6,13 +6,13 @@ use serde_json::json;
 
 use crate::fixture::Fixture;
 
-/// A tetrahedron's corners as three to a face, without normals, so that its faces share no vertices.
+/// A tetrahedron's corners, three for each face, without normals, so that faces share no vertices.
 fn tetrahedron() -> Vec<[f32; 3]> {
     let [a, b, c, d] = [[0.0, 0.1, 0.0], [0.4, 0.1, 0.0], [0.0, 0.5, 0.0], [0.0, 0.1, 0.4]];
     [[a, c, b], [a, b, d], [b, c, d], [a, d, c]].concat()
 }
 
-/// The room, whose floor is glass without a volume, and an object of the same glass with these corners.
+/// The room, with a floor of glass without a volume, and an object of the same glass with these corners.
 fn room_with_glass(corners: &[[f32; 3]]) -> Fixture {
     let mut room = Fixture::room();
     room.set(
@@ -80,9 +80,9 @@ fn closed_meshes_of_it_are_solid_where_that_is_asked_for_and_open_ones_named() {
     assert!(note.contains("\"floor\"") && !note.contains("\"drop\""), "{note}");
 }
 
-/// A hole, a face turned round, and all of them.
+/// A hole, a flipped face, and all faces flipped.
 #[test]
-fn what_has_no_inside_stays_thin() {
+fn glass_without_an_inside_stays_thin() {
     let turned = |corners: &[[f32; 3]]| -> Vec<[f32; 3]> {
         corners.chunks(3).flat_map(|face| [face[0], face[2], face[1]]).collect()
     };
@@ -99,7 +99,7 @@ fn what_has_no_inside_stays_thin() {
     }
 }
 
-/// Blender splits a mesh by material: half of it alone isn't closed.
+/// Blender splits a mesh by material: half of it alone is not closed.
 #[test]
 fn a_mesh_of_two_materials_is_closed_as_a_whole() {
     let whole = tetrahedron();
@@ -112,7 +112,7 @@ fn a_mesh_of_two_materials_is_closed_as_a_whole() {
     assert!(!glass_of(&solid_glass(&room), "drop").thin);
 }
 
-/// A volume of no thickness says what the glass absorbs.
+/// A volume of thickness 0 defines the glass's absorption.
 #[test]
 fn solid_glass_absorbs_as_a_volume_without_thickness_says() {
     let mut room = room_with_glass(&tetrahedron());

@@ -1,4 +1,4 @@
-//! Tangents where the file has none.
+//! Tangents that the file does not have.
 
 use glam::{Vec3, Vec4};
 use serde_json::json;
@@ -32,7 +32,7 @@ fn a_normal_texture_gets_tangents_along_u_and_up() {
 #[test]
 fn a_mirrored_texture_turns_the_bitangent_round_and_splits_the_seam() {
     let mut room = textured();
-    // The two triangles of the floor share an edge; u runs the other way on the second.
+    // The two triangles of the floor share an edge; u is reversed on the second.
     let texcoords = room.add_floats("VEC2", 2, &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, -1.0, 0.0]);
     room.set("/meshes/0/primitives/0/attributes/TEXCOORD_0", json!(texcoords));
     let scene = room.scene();

@@ -68,7 +68,7 @@ fn one_image_is_stored_once_and_looked_up_as_each_slot_wants() {
 }
 
 #[test]
-fn samplers_sets_and_transforms_are_what_the_file_says() {
+fn samplers_sets_and_transforms_have_the_values_of_the_file() {
     let transform =
         json!({"offset": [0.5, 0.25], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2, 3], "texCoord": 1});
     let info = json!({"index": 0, "extensions": {"KHR_texture_transform": transform}});
@@ -90,13 +90,13 @@ fn samplers_sets_and_transforms_are_what_the_file_says() {
         close(lookup.row_u, [0.0, 3.0, 0.5]) && close(lookup.row_v, [-2.0, 0.0, 0.25]),
         "{lookup:?}"
     );
-    // The second set alone is read: 3 · 0.2 + 0.5 lies past the last texel, which goes on.
+    // Only the second set is read: 3 · 0.2 + 0.5 lies past the last texel, which is clamped.
     let value = scene.textures.value(0, [DVec2::splat(7.0), DVec2::new(0.0, 0.2)]);
     assert_eq!(value.to_array(), [0.0, 1.0, 0.0, 128.0 / 255.0]);
 }
 
 #[test]
-fn images_that_cannot_be_read_are_told_and_left_out() {
+fn unreadable_images_are_reported_and_left_out() {
     let floor = || with_base_color(json!({"index": 0}));
     for (image, parts) in [
         (json!({"uri": "absent.png"}), ["absent.png", "left out"]),
@@ -109,7 +109,7 @@ fn images_that_cannot_be_read_are_told_and_left_out() {
             ["not PNG, JPEG, WebP or KTX 2.0", "left out"],
         ),
         (json!({}), ["neither a uri nor a bufferView", "left out"]),
-        // What the decoder says of a JPEG that is cut short ends with a line end.
+        // The decoder's message for a truncated JPEG ends with a line break.
         (
             json!({"uri": "data:;base64,/9j/4AAQSkZJRgABAQAAAQABAAD/"}),
             ["can't be decoded", "left out"],
@@ -128,7 +128,7 @@ fn images_that_cannot_be_read_are_told_and_left_out() {
     room.assert_warns(&["texture 0", "MSFT_texture_dds", "left out"]);
 }
 
-/// A room whose floor's texture is an image by an extension, which it requires, with the PNG to stand for it or not.
+/// A room whose floor's texture is an image by a required extension, with or without the PNG as a fallback.
 fn textured_by(extension: &str, uri: &str, has_fallback: bool) -> Fixture {
     let mut room = textured(with_base_color(json!({"index": 0})));
     let source = json!({extension: {"source": 1}});
@@ -143,14 +143,14 @@ fn textured_by(extension: &str, uri: &str, has_fallback: bool) -> Fixture {
 }
 
 #[test]
-fn webp_is_read_before_what_stands_for_it() {
+fn webp_is_preferred_to_its_fallback() {
     let plain = textured(with_base_color(json!({"index": 0}))).scene();
     for has_fallback in [true, false] {
         let scene = textured_by("EXT_texture_webp", &webp_uri(), has_fallback).scene();
         assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
         assert_eq!(scene.textures, plain.textures);
     }
-    // The PNG is another picture here: what is looked up is the WebP.
+    // The PNG is another image: lookups use the WebP.
     let mut room = textured_by("EXT_texture_webp", &webp_uri(), true);
     room.set("/images/0", json!({"uri": "absent.png"}));
     assert_eq!(room.scene().textures, plain.textures);
@@ -180,7 +180,7 @@ fn ktx2_is_transcoded() {
 }
 
 #[test]
-fn what_stands_for_an_unreadable_image_is_used_and_that_is_said() {
+fn the_fallback_of_an_unreadable_image_is_used_with_a_warning() {
     let plain = textured(with_base_color(json!({"index": 0}))).scene();
     for (extension, bytes) in [
         ("EXT_texture_webp", "AAAA"),
@@ -225,7 +225,7 @@ fn textures_that_do_not_exist_are_refused() {
 }
 
 #[test]
-fn what_is_unlit_shows_its_base_color_and_is_no_light() {
+fn unlit_surfaces_show_their_base_color_and_are_no_lights() {
     let mut material = with_base_color(json!({"index": 0}));
     material["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.5, 0.25, 1, 1]);
     material["emissiveFactor"] = json!([1, 1, 1]);
@@ -261,7 +261,7 @@ fn alpha_is_as_the_file_says() {
     assert_eq!(with(json!({"alphaMode": "MASK", "alphaCutoff": 0.2})), mask(0.2));
 }
 
-/// A black PNG in the room's folder, of which the room's floor has so many copies as textures.
+/// A black PNG in the room's folder; the room's floor has this number of copies as textures.
 pub fn with_images(count: usize, side: u32) -> Fixture {
     let mut room = Fixture::room();
     let mut png = std::io::Cursor::new(Vec::new());
@@ -285,7 +285,7 @@ pub fn with_images(count: usize, side: u32) -> Fixture {
 #[test]
 fn the_pixels_of_an_image_decide_how_much_of_its_file_is_read() {
     let room = with_images(2, 4);
-    // What follows the picture takes no room on the disk, but 6 GiB in memory.
+    // The part after the image takes no room on the disk, but 6 GiB in memory.
     let file = std::fs::File::options().append(true).open(room.path("black.png"));
     file.and_then(|file| file.set_len(6 << 30)).expect("a sparse file");
     let (scene, peak) = peak_of(|| room.scene());

@@ -1,4 +1,4 @@
-//! Grids that would have more cells than memory, radii of every size, photons that don't fit.
+//! Grids with more cells than memory, radii of all sizes, and photons that exceed the capacity.
 
 use glam::Vec3;
 use ppm_vk::internals::config::{Direct, EmissionChoice, RenderConfig};
@@ -13,7 +13,7 @@ use super::bench::{Bench, object, photon, random_numbers, visible_point, xyz};
 use super::model::Model;
 use super::sound::{assert_sound, render, render_within, square};
 
-/// Gathers by every method of a device; each finds M photons as testing each of them on the CPU does. Returns M.
+/// Gathers with every method of a device; each finds the same photons as testing all of them on the CPU. Returns M.
 fn assert_gathers_agree(
     bench: &mut Bench,
     what: &str,
@@ -69,7 +69,7 @@ fn a_grid_of_1e15_cells_takes_no_more_memory_and_finds_every_photon() {
         );
     }
     let points: Vec<VisiblePoint> = bench.download(BufferId::VisiblePoints);
-    // One photon within R of every visible point, one past it.
+    // One photon within R of every visible point, one outside.
     let mut photons = Vec::new();
     for point in &points {
         if let Some(object) = object(point.object) {
@@ -120,7 +120,7 @@ fn radii_that_differ_by_a_million_in_one_picture_find_their_photons() {
     );
 }
 
-/// A closed room that absorbs nothing.
+/// A closed room without absorption.
 fn white_room() -> Scene {
     let mut model = Model::new();
     let white = model.matte([1.0; 3], 1.0);
@@ -129,8 +129,8 @@ fn white_room() -> Scene {
     model.scene()
 }
 
-/// In a closed room that absorbs nothing each path leaves as many photons as it may have bounces, forty times more than a lane
-/// is given room for, and no buffer may be larger than a hundredth of them.
+/// In a closed room without absorption each path leaves as many photons as the bounce limit allows, forty times more than a
+/// lane's capacity, and no buffer may be larger than a hundredth of them.
 #[test]
 fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing() {
     const DEPTH: u32 = 800;
@@ -139,7 +139,7 @@ fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing()
     let config = RenderConfig {
         direct: Direct::Photons,
         radius: Some(0.2),
-        // Each path has as many photons.
+        // Each path has the same number of photons.
         emission: EmissionChoice::Power,
         drop_unwanted: false,
         max_depth: DEPTH,
@@ -181,8 +181,8 @@ fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing()
     }
 }
 
-/// Pilot paths leave ten times as many photons as a path is expected to: rounds are done again in smaller batches, and what is
-/// learned from is no longer than those.
+/// Pilot paths leave ten times as many photons as expected: rounds are repeated in smaller batches, and the learned photons are
+/// limited to a batch.
 #[test]
 fn pilot_paths_whose_photons_do_not_fit_are_learned_from_in_smaller_batches() {
     const PATHS: u32 = 20_000;

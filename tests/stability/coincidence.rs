@@ -1,4 +1,4 @@
-//! Faces in one place: which of them a ray meets is no chance.
+//! Coincident faces: which of them a ray hits does not depend on chance.
 
 use glam::Vec3;
 use ppm_vk::internals::backend::Backend;
@@ -12,11 +12,11 @@ use serde_json::json;
 use super::model::{Model, parallelogram};
 use super::sound::{render, square};
 
-/// Turned, so that the coordinates have all their bits, or with all of a face's corners on one coordinate.
+/// Rotated, so that the coordinates use all their bits, or with all corners of a face on one coordinate.
 const TURNS: [[f64; 4]; 2] = [[0.0, 0.0, 0.0, 1.0], [0.1825742, 0.3651484, 0.5477226, 0.7302967]];
 
-/// Mean red of pictures of a scene, with what says how each was made: by kernels with both hierarchies and triangle tests, and by
-/// their twin; with direct light by rays and by photons.
+/// Mean red of pictures of a scene, with a description of each: by kernels with both hierarchies and triangle tests, and by the
+/// CPU renderer; with direct light by light samples and by photons.
 fn pictures(scene: &Scene) -> Vec<(String, f64)> {
     let packed = PackedScene::new(scene).expect("packed scene");
     let mean = |image: &Image| {
@@ -50,9 +50,8 @@ fn pictures(scene: &Scene) -> Vec<(String, f64)> {
     means
 }
 
-/// Asserts that all pictures of a room show this radiance. The walls shine with 1 from all sides; `build` puts things into it,
-/// and the camera looks down to its middle. False alarms: the noise is a third of the tolerance; what goes wrong is a quarter of
-/// the light at least.
+/// Asserts that all pictures of a room show this radiance. The walls emit 1 to all sides; `build` adds objects, and the camera
+/// looks down at the middle. False alarms: the noise is a third of the tolerance; a fault changes the light by a quarter or more.
 #[track_caller]
 fn assert_shows(expected: f64, what: &str, build: impl Fn(&mut Model)) {
     for turn in TURNS {
@@ -71,13 +70,13 @@ fn assert_shows(expected: f64, what: &str, build: impl Fn(&mut Model)) {
     }
 }
 
-/// A floor of half the room's width; looking up or down.
+/// A floor half as wide as the room, facing up or down.
 fn floor(up: bool, scale: f32) -> [[Vec3; 3]; 2] {
     let triangles = parallelogram(Vec3::new(-0.5, 0.0, -0.5) * scale, Vec3::Z * scale, Vec3::X * scale);
     triangles.map(|[a, b, c]| if up { [a, b, c] } else { [a, c, b] })
 }
 
-/// Adds two objects, the second one first where they are reversed.
+/// Adds two objects, in reverse order if `reversed`.
 fn add_in_order(model: &mut Model, mut faces: [(usize, [[Vec3; 3]; 2]); 2], reversed: bool) {
     if reversed {
         faces.reverse();
@@ -105,8 +104,8 @@ fn of_doubled_faces_a_ray_meets_the_one_that_looks_to_it_in_every_order() {
     });
 }
 
-/// A label of the wall's colour that is half there, or a black one that is cut out. Whichever a path meets, the light there is
-/// that of the place.
+/// A label of the wall's colour that is half transparent, or a black one that is cut out. Whichever face a path hits, the
+/// radiance is the same.
 #[test]
 fn a_label_shows_the_wall_that_it_lies_on_where_it_is_clear() {
     for (mode, albedo, alpha) in [("BLEND", 0.8, 0.5), ("MASK", 0.0, 0.3)] {
@@ -143,7 +142,7 @@ fn a_lamp_flush_with_a_ceiling_is_seen_in_every_order() {
     }
 }
 
-/// Both faces of one mesh shine, each to its side.
+/// Both faces of one mesh emit, each to its side.
 #[test]
 fn a_doubled_lamp_is_seen_in_a_mirror_in_every_order() {
     for down_first in [true, false] {
@@ -160,7 +159,7 @@ fn a_doubled_lamp_is_seen_in_a_mirror_in_every_order() {
     }
 }
 
-/// A black poster in a window has its back to the camera.
+/// The back of a black poster in a window faces the camera.
 #[test]
 fn a_poster_in_a_window_is_not_seen_from_behind() {
     for poster_first in [true, false] {
@@ -177,8 +176,8 @@ fn a_poster_in_a_window_is_not_seen_from_behind() {
     }
 }
 
-/// In light of 1 from all sides a pane shows 1 but for what is behind it: a black wall, so that it shows what it reflects. One
-/// pane's 4 % at right angles, or two panes' 7.7 %.
+/// In uniform light of 1 a pane shows 1, except for the black wall behind it, so that only its reflection is visible: 4 % at
+/// normal incidence for one pane, 7.7 % for two.
 #[test]
 fn a_doubled_pane_reflects_as_one_or_two_and_a_box_without_thickness_as_a_pane() {
     let boxes = [floor(true, 1.0), floor(false, 1.0)];
@@ -222,10 +221,10 @@ fn a_doubled_pane_reflects_as_one_or_two_and_a_box_without_thickness_as_a_pane()
     }
 }
 
-/// A lamp that a file has twice, looking down or to both sides, lights the floor as one does. Against the same scene with the lamp
-/// once; false alarms: what goes wrong is a factor of two, the noise of the mean of 64 pixels less than a twentieth of that.
+/// A duplicate lamp, facing down or two-sided, lights the floor like one lamp. Compared with the scene with one lamp; false
+/// alarms: a fault is a factor of two, the noise of the mean of 64 pixels is below a twentieth of that.
 #[test]
-fn a_doubled_lamp_shines_as_one() {
+fn a_doubled_lamp_lights_as_one() {
     let lit = |copies: usize, two_sided: bool, turned: bool| {
         let mut model = Model::new();
         let white = model.matte([0.8; 3], 0.0);

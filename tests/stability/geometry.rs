@@ -1,4 +1,4 @@
-//! Triangles that must upset neither the loader nor the hierarchy nor the renderer.
+//! Triangles that must not break the loader, the hierarchy or the renderer.
 
 use std::f64::consts::PI;
 
@@ -10,11 +10,11 @@ use super::model::{Model, parallelogram};
 use super::sound::{assert_mean, render, square};
 
 const ALBEDO: f32 = 0.5;
-/// Angle of view that sees a tenth of the patch.
+/// Field of view that covers a tenth of the patch.
 const WIDE: f32 = 0.1;
 
-/// A flat patch of albedo ½ around the origin, in the plane z = 0 of a room whose walls shine with 1 and reflect nothing.
-/// Both its sides have radiance ½ wherever it lies free.
+/// A flat patch of albedo ½ around the origin, in the plane z = 0 of a room whose walls emit 1 and reflect nothing. Both its
+/// sides have radiance ½ where nothing covers it.
 fn patch(add: impl FnOnce(&mut Model, usize), fov: f32) -> Model {
     let mut model = Model::new();
     let walls = model.black(1.0);
@@ -34,17 +34,17 @@ fn corners(half: f32) -> [Vec3; 3] {
     ]
 }
 
-/// Checks what the camera sees, by shadow rays and by photons.
+/// Checks the visible radiance, by light samples and by photons.
 #[track_caller]
 fn assert_patch_is_right(what: &str, model: &Model) {
     let scene = model.file.scene();
-    // Each pixel draws its own shadow rays.
+    // Each pixel draws its own light samples.
     let image = render(&scene, 0, 4, square(48, 1000)).image;
     let samples: Vec<f64> = image.pixels().iter().map(|pixel| pixel[0].into()).collect();
     assert_mean(&format!("{what}, by shadow rays"), &samples, ALBEDO.into(), 1e-6);
 
-    // A path brings the disc of radius R around what a pixel sees one photon or none, all of one power: its radiance is
-    // that of a binomial number. Past 6 standard deviations chance is 2 in 10⁹.
+    // A path contributes one photon or none to the disc of radius R of a pixel, all of the same power: the radiance is a binomial
+    // number. Beyond 6 standard deviations: probability 2 in 10⁹.
     let config = RenderConfig {
         direct: Direct::Photons,
         radius: Some(0.2),
@@ -91,7 +91,7 @@ fn a_patch_of_slivers_and_needles_of_aspect_a_million_is_as_bright_as_any() {
 }
 
 #[test]
-fn triangles_of_zero_area_are_counted_told_and_change_nothing() {
+fn triangles_of_zero_area_are_counted_and_reported_and_change_nothing() {
     let with_degenerate = |model: &mut Model, matte| {
         let [corner, a, b] = corners(0.5);
         let mut triangles = parallelogram(corner, a, b).to_vec();
@@ -125,9 +125,9 @@ fn two_faces_in_one_place_are_as_bright_as_one() {
 
 /// Inside a block there are no photons; on both sides of a sheet there are.
 #[test]
-fn what_stands_on_a_patch_hides_what_is_under_it_and_no_more() {
+fn an_object_on_a_patch_hides_the_area_under_it_and_no_more() {
     let [corner, a, b] = corners(0.5);
-    // What stands there shines as the walls do, so that the light in the room stays even.
+    // The block emits like the walls, so that the light in the room stays uniform.
     let with_sheet = |model: &mut Model, matte| {
         model.quad(matte, corner, a, b);
         let sheet = model.black(1.0);

@@ -1,4 +1,4 @@
-//! Glass and mirrors where they are hardest: from inside, at the critical angle, against each other, without end.
+//! Glass and mirrors in hard cases: from inside, at the critical angle, touching each other, and without end.
 
 use std::f64::consts::PI;
 
@@ -19,7 +19,7 @@ use super::sound::{render, square};
 
 const IOR: f32 = 1.5;
 
-/// A room, 2 wide, whose walls shine with 1 and reflect nothing: what doesn't absorb is invisible in it.
+/// A room, 2 wide, whose walls emit 1 and reflect nothing: objects without absorption are invisible in it.
 fn shining_room() -> Model {
     let mut model = Model::new();
     let walls = model.black(1.0);
@@ -27,7 +27,7 @@ fn shining_room() -> Model {
     model
 }
 
-/// Directions of the rays through the pixels' centres, as far as f64 can tell, by pixel.
+/// Directions of the rays through the pixels' centres in f64, by pixel.
 fn direction(settings: &Settings, x: f64, y: f64) -> DVec3 {
     let film = |at: f64, side: u32| at / f64::from(side) * 2.0 - 1.0;
     let [width, height] = settings.resolution;
@@ -36,9 +36,9 @@ fn direction(settings: &Settings, x: f64, y: f64) -> DVec3 {
     .normalize()
 }
 
-/// Radiance over n² stays the same at a boundary, so that inside of glass it is n² times that outside. A ray in a box
-/// keeps the sizes of its direction's components: where all of them are below the cosine of the critical angle it is
-/// reflected for ever. Such light was never there; the renderer follows those paths to their bounce limit and says so.
+/// Radiance over n² is constant across a boundary, so that inside glass it is n² times that outside. In a box, the absolute
+/// components of a ray's direction are constant: if all are below the cosine of the critical angle, the ray is reflected for
+/// ever. There is no such light; the renderer traces these paths to their bounce limit and reports it.
 #[test]
 fn a_camera_inside_a_glass_box_sees_n_squared_times_the_light_outside_or_total_reflection_without_end() {
     let mut model = shining_room();
@@ -75,15 +75,15 @@ fn a_camera_inside_a_glass_box_sees_n_squared_times_the_light_outside_or_total_r
     let truncated = rendered.counters.truncated_paths;
     assert!(
         truncated >= trapped * u64::from(iterations),
-        "{truncated} paths are said to be cut"
+        "{truncated} paths are reported as cut"
     );
     let warnings = Warning::of(&rendered.counters, rendered.renderer.emitted(), max_depth);
     let is_told = |warning: &Warning| matches!(warning, Warning::Truncated { .. }) && !warning.is_slight();
     assert!(warnings.iter().any(is_told), "{warnings:?}");
 }
 
-/// The photons of a small lamp in the middle of a glass ball, and the lamp's flux. What the ball reflects comes back to
-/// the lamp, which absorbs it as the walls do. So each path ends once, and takes its whole flux with it.
+/// Photons of a small lamp in the middle of a glass ball, and the lamp's flux. Reflections of the ball return to the lamp, which
+/// absorbs them like the walls. So each path ends once, with its whole flux.
 fn lamp_in_a_glass_ball(smooth: bool) -> (Vec<Photon>, f64) {
     let mut model = Model::new();
     let walls = model.black(0.0);
@@ -115,8 +115,8 @@ fn mean_flux(photons: &[Photon]) -> f64 {
     photons.iter().map(flux).sum::<f64>() / photons.len() as f64
 }
 
-/// The ball is made of plane facets: where a shading normal leans, a photon's flux has the adjoint BSDF's factor, so
-/// that the whole is kept in the mean only.
+/// The ball is made of plane facets: interpolated shading normals give a photon's flux the factor of the adjoint BSDF, so that
+/// the total is conserved only in the mean.
 #[test]
 fn all_light_of_a_lamp_inside_a_glass_ball_of_facets_arrives() {
     let (photons, emitted) = lamp_in_a_glass_ball(false);
@@ -124,10 +124,9 @@ fn all_light_of_a_lamp_inside_a_glass_ball_of_facets_arrives() {
     assert!((arrived / emitted - 1.0).abs() < 1e-5, "{arrived} of {emitted} arrives");
 }
 
-/// Straight through the boundary 4 % is reflected, nearly all of it back to the lamp: a binomial number, and 6 of its
-/// standard deviations.
+/// At normal incidence 4 % is reflected, nearly all of it back to the lamp: a binomial number, with 6 of its standard deviations.
 #[test]
-fn what_a_smooth_glass_ball_reflects_comes_back_to_the_lamp_in_its_middle() {
+fn light_that_a_smooth_glass_ball_reflects_returns_to_the_lamp_in_its_middle() {
     let (photons, emitted) = lamp_in_a_glass_ball(true);
     let arrived = mean_flux(&photons);
     assert!((arrived / emitted - 1.0).abs() < 1e-3, "{arrived} of {emitted} arrives");
@@ -136,15 +135,15 @@ fn what_a_smooth_glass_ball_reflects_comes_back_to_the_lamp_in_its_middle() {
     let back = photons.iter().filter(returned).count() as f64 / paths;
     let expected = 0.04;
     let deviation = f64::sqrt(expected * (1.0 - expected) / paths);
-    println!("{back} of the light comes back to the lamp, {expected} ± {deviation:.1e} expected");
+    println!("{back} of the light returns to the lamp, {expected} ± {deviation:.1e} expected");
     assert!(
         back < expected + 6.0 * deviation,
-        "{back} of the light comes back to the lamp"
+        "{back} of the light returns to the lamp"
     );
-    assert!(back > 0.9 * expected, "{back} of the light comes back to the lamp");
+    assert!(back > 0.9 * expected, "{back} of the light returns to the lamp");
 }
 
-/// Fresnel's reflectance for unpolarised light from inside of glass, by sin² of the angle outside.
+/// Fresnel reflectance for unpolarised light from inside glass, by sin² of the angle outside.
 fn reflectance(sin2_t: f64) -> f64 {
     if sin2_t >= 1.0 {
         return 1.0;
@@ -156,8 +155,8 @@ fn reflectance(sin2_t: f64) -> f64 {
     0.5 * (perpendicular * perpendicular + parallel * parallel)
 }
 
-/// Next to the critical angle reflectance has an infinite slope, so that the device's must be that of a sin² as near as
-/// f32 can have it: 2.25 · (1 − cos²) of a cosine that is 3 roundings off.
+/// At the critical angle reflectance has an infinite slope. The device's must be that of a sin² within the precision of f32:
+/// 2.25 · (1 − cos²) for a cosine with 3 rounding errors.
 #[test]
 fn reflectance_at_the_critical_angle_is_fresnels_to_within_rounding_of_the_angle() {
     const ROUNDING: f64 = 1e-6;
@@ -168,7 +167,7 @@ fn reflectance_at_the_critical_angle_is_fresnels_to_within_rounding_of_the_angle
         model.room(walls, Vec3::NEG_ONE, Vec3::ONE);
         let glass = model.glass(IOR);
         model.quad(glass, Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0);
-        // On the quad's back: inside.
+        // Behind the quad: inside the glass.
         model.camera(Vec3::Z * -0.5, Vec3::X * (0.5 * critical.tan()), fov);
         let config = RenderConfig {
             estimator: Estimator::Ppm,
@@ -212,7 +211,7 @@ fn reflectance_at_the_critical_angle_is_fresnels_to_within_rounding_of_the_angle
     }
 }
 
-/// Two blocks of glass side by side, seen from an angle, and turned, so that the coordinates have all their bits.
+/// Two blocks of glass side by side, seen at an angle, and rotated, so that the coordinates use all their bits.
 fn two_blocks(iors: [f32; 2], gap: f32) -> Scene {
     let mut model = shining_room();
     let [left, right] = iors.map(|ior| model.glass(ior));
@@ -225,8 +224,7 @@ fn two_blocks(iors: [f32; 2], gap: f32) -> Scene {
     model.scene()
 }
 
-/// The blocks' faces may be as near to each other as a few of the steps by which rays leave a surface, or touch in a part of
-/// them.
+/// The blocks' faces may be only a few ray offsets apart, or touch in a part of their area.
 #[test]
 fn glass_beside_glass_of_any_index_is_invisible_in_uniform_light_with_a_gap_or_without() {
     for iors in [[1.5, 1.5], [1.5, 1.2], [1.2, 2.0]] {
@@ -245,8 +243,8 @@ fn glass_beside_glass_of_any_index_is_invisible_in_uniform_light_with_a_gap_or_w
     }
 }
 
-/// A block of glass lies on a shining wall. From inside, straight up, its other face shows 4 % of the wall's light in a mirror
-/// and n² times the other 96 % of the light outside, whichever of the two faces in one place a ray meets first.
+/// A block of glass lies on an emissive wall. From inside, straight up, its other face shows 4 % of the wall's light as a
+/// reflection and n² times the other 96 % of the light outside, whichever of the two coincident faces a ray hits first.
 #[test]
 fn a_shining_wall_that_glass_lies_on_is_seen_mirrored_in_it() {
     let mut model = shining_room();
@@ -268,8 +266,8 @@ fn a_shining_wall_that_glass_lies_on_is_seen_mirrored_in_it() {
         .iter()
         .filter(|pixel| (pixel[0] - expected).abs() > 1e-4);
     assert_eq!(wrong.count(), 0, "pixels that aren't {expected}");
-    // There chance chooses whether a path is mirrored or passes: 2,304 paths, one of which has a standard deviation of √(0.04 · 0.96)
-    // times the difference. Six of the mean's fail a right program once in 5·10⁸ times.
+    // Paths are reflected or transmitted at random: 2,304 paths, each with a standard deviation of √(0.04 · 0.96) times the
+    // difference. Six standard deviations of the mean: a correct program fails once in 5·10⁸ runs.
     let image = twin.resolve().expect("picture");
     let mean = image.pixels().iter().map(|pixel| pixel[0]).sum::<f32>() / image.pixels().len() as f32;
     let deviation = (0.04f32 * 0.96 / 2304.0).sqrt() * (IOR * IOR - 1.0);
@@ -277,12 +275,12 @@ fn a_shining_wall_that_glass_lies_on_is_seen_mirrored_in_it() {
     let is_either = |value: f32| (value - 1.0).abs() < 1e-4 || (value - IOR * IOR).abs() < 1e-4;
     assert!(
         image.pixels().iter().all(|pixel| is_either(pixel[0])),
-        "CPU: pixels that are neither way's"
+        "CPU: pixels that match neither case"
     );
 }
 
-/// A room of mirrors that reflect all: a path ends at the lamp or at the bounce limit. Whatever reaches neither the picture
-/// nor the lamp is counted.
+/// A room of perfect mirrors: a path ends at the lamp or at the bounce limit. Light that reaches neither the picture nor the lamp
+/// is counted.
 #[test]
 fn paths_in_a_room_of_mirrors_end_at_the_lamp_or_are_counted() {
     let mut model = Model::new();

@@ -1,4 +1,4 @@
-//! Lamps and cameras in liquids.
+//! Lamps and cameras inside liquids.
 
 use glam::Vec3;
 use ppm_vk::internals::backend::Backend;
@@ -11,7 +11,7 @@ use serde_json::json;
 use super::model::Model;
 use super::sound::{render, square};
 
-/// What light keeps of a unit of length in the liquid.
+/// Transmittance of a unit of length of the liquid.
 const KEEPS: f32 = 0.4;
 
 #[derive(Debug, Clone, Copy)]
@@ -20,8 +20,8 @@ enum Lamp {
     Point,
 }
 
-/// A floor one unit below a lamp and one unit from a camera, all in a block of liquid that doesn't bend light. With a `glass`
-/// around, the liquid is pushed into it.
+/// A floor one unit below a lamp and one unit from a camera, all in a block of liquid of index 1. With `glass`, the liquid is
+/// inside a glass and overlaps it.
 fn tank(lamp: Lamp, keeps: f32, glass: bool) -> Scene {
     let mut model = Model::new();
     let absorbing = |model: &mut Model, keeps: f32| {
@@ -62,7 +62,7 @@ fn tank(lamp: Lamp, keeps: f32, glass: bool) -> Scene {
     model.scene()
 }
 
-/// Mean of the picture by kernels and by their twin.
+/// Mean of the picture by kernels and by the CPU renderer.
 fn seen(scene: &Scene, direct: Direct) -> [f64; 2] {
     let config = RenderConfig {
         direct,

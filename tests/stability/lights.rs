@@ -1,4 +1,4 @@
-//! Lights and photons of very different power together.
+//! Lights and photons of very different power in one scene.
 
 use glam::Vec3;
 use ppm_vk::internals::config::RenderConfig;
@@ -26,14 +26,14 @@ fn two_rooms() -> Scene {
 }
 
 #[test]
-fn light_of_1e_minus_6_is_right_beside_light_of_1e6_where_each_shines_alone() {
+fn light_of_1e_minus_6_is_right_beside_light_of_1e6_in_separate_rooms() {
     let scene = two_rooms();
     assert_lit_by_shadow_rays("light of 1e-6", &scene, 0, DIM);
     assert_lit_by_shadow_rays("light of 1e6", &scene, 1, BRIGHT);
     assert_lit_by_photons("two rooms", &scene, &[DIM, BRIGHT]);
 }
 
-/// The flux of a photon as it is stored, moved together, sorted and gathered.
+/// The flux of a photon must survive storing, compacting, sorting and gathering.
 #[test]
 fn a_photons_power_survives_its_way_to_the_gather_over_twelve_orders_of_magnitude() {
     let config = RenderConfig {
@@ -43,7 +43,7 @@ fn a_photons_power_survives_its_way_to_the_gather_over_twelve_orders_of_magnitud
         ..RenderConfig::default()
     };
     let mut bench = Bench::new("cornell", config);
-    // Slot i lies on object i and is reached by one photon, which lane i stored.
+    // Slot i lies on object i and receives one photon, stored by lane i.
     let power = |i: u32| 10f32.powf(-6.0 + 12.0 * i as f32 / 63.0);
     let flux = |i: u32| [power(i), 1.0 / power(i), 1.0];
     let objects = bench.scene.object_grids.len() as u32;

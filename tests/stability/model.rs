@@ -7,13 +7,13 @@ use tempfile::TempDir;
 
 use super::fixture::Fixture;
 
-/// A scene in the making. Materials and cameras are named by their numbers.
+/// A scene under construction. Materials and cameras are referred to by index.
 pub struct Model {
     pub file: Fixture,
 }
 
 impl Model {
-    /// Nothing.
+    /// An empty scene.
     pub fn new() -> Self {
         Self {
             file: Fixture {
@@ -51,12 +51,12 @@ impl Model {
         )
     }
 
-    /// A matte material that reflects nothing.
+    /// A black matte material.
     pub fn black(&mut self, radiance: f32) -> usize {
         self.matte([0.0; 3], radiance)
     }
 
-    /// A mirror that absorbs nothing.
+    /// A perfect mirror.
     pub fn mirror(&mut self) -> usize {
         self.add(
             "materials",
@@ -107,7 +107,7 @@ impl Model {
         self.mesh(material, box_sides(low, high).as_flattened());
     }
 
-    /// A box with a hollow: one object. Without an outside, the hollow alone, its fronts inside.
+    /// A box with a hollow: one object. Without an outside, only the hollow, with fronts facing inwards.
     pub fn shell(&mut self, material: usize, outer: [Vec3; 2], hollow: [Vec3; 2]) {
         let [low, high] = hollow;
         let inside = box_sides(low, high).as_flattened().to_vec();
@@ -118,7 +118,7 @@ impl Model {
         self.mesh(material, &triangles);
     }
 
-    /// A sphere of flat triangles, or with the shading normals of a true sphere. Its corners lie on the true sphere.
+    /// A sphere of flat triangles, or with the shading normals of a true sphere. Its corners lie on the sphere.
     pub fn sphere(&mut self, material: usize, centre: Vec3, radius: f32, smooth: bool) {
         let triangles = sphere_triangles(16);
         let placed: Vec<[Vec3; 3]> = triangles.iter().map(|t| t.map(|n| centre + radius * n)).collect();
@@ -134,7 +134,7 @@ impl Model {
         }
     }
 
-    /// A camera with this vertical angle of view, rad.
+    /// A camera with this vertical field of view, rad.
     pub fn camera(&mut self, from: Vec3, to: Vec3, fov: f32) {
         let camera = self.add(
             "cameras",
@@ -149,7 +149,7 @@ impl Model {
         }));
     }
 
-    /// The scene, which must load without any warning.
+    /// The scene, which must load without warnings.
     #[track_caller]
     pub fn scene(&self) -> Scene {
         let scene = self.file.scene();
@@ -163,7 +163,7 @@ pub fn parallelogram(corner: Vec3, a: Vec3, b: Vec3) -> [[Vec3; 3]; 2] {
     [[corner, x, y], [corner, y, z]]
 }
 
-/// The sides of a box, fronts outside.
+/// The sides of a box, fronts facing outwards.
 fn box_sides(low: Vec3, high: Vec3) -> [[[Vec3; 3]; 2]; 6] {
     let size = high - low;
     let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
@@ -177,7 +177,7 @@ fn box_sides(low: Vec3, high: Vec3) -> [[[Vec3; 3]; 2]; 6] {
     ]
 }
 
-/// A unit sphere: the faces of a cube, each divided into `pieces`² squares, blown up.
+/// A unit sphere: the faces of a cube, each divided into `pieces`² squares, projected.
 fn sphere_triangles(pieces: u32) -> Vec<[Vec3; 3]> {
     let step = 2.0 / pieces as f32;
     let mut triangles = Vec::new();

@@ -1,4 +1,4 @@
-//! Dielectrics inside of others, touching or overlapping them.
+//! Dielectrics inside others, touching or overlapping them.
 
 use glam::Vec3;
 use ppm_vk::internals::backend::Backend;
@@ -10,10 +10,10 @@ use serde_json::json;
 use super::model::Model;
 use super::sound::{render, square};
 
-/// Boxes about the origin, which is what the layers along the line of sight are.
+/// Boxes around the origin: layers along the line of sight.
 struct Body {
     ior: f32,
-    /// What light keeps of a unit of length.
+    /// Transmittance of a unit of length.
     keeps: f32,
     /// Half of its side, and of a hollow in it.
     half: f32,
@@ -29,7 +29,7 @@ fn body(ior: f32, keeps: f32, half: f32, hollow: Option<f32>) -> Body {
     }
 }
 
-/// Radiance of the middle pixel by kernels and by their twin. Light of 1 comes from all sides.
+/// Radiance of the middle pixel by kernels and by the CPU renderer. Light of 1 arrives from all sides.
 fn middle(bodies: &[Body]) -> [f64; 2] {
     let scene = scene(bodies);
     let config = square(16, 1000);
@@ -73,8 +73,8 @@ fn scene(bodies: &[Body]) -> Scene {
     model.scene()
 }
 
-/// What is seen along the axis of layers: index of refraction and kept share of each, in light of 1 from both sides. Adding up
-/// all reflections: van de Hulst's adding of layers, without phases.
+/// Radiance along the axis of layers with these indices of refraction and transmittances, in light of 1 from both sides. Adds up
+/// all reflections: van de Hulst's adding method, without phases.
 fn seen(layers: &[(f64, f64)]) -> f64 {
     let fresnel = |from: f64, to: f64| ((from - to) / (from + to)).powi(2);
     let iors: Vec<f64> = [1.0]
@@ -82,7 +82,7 @@ fn seen(layers: &[(f64, f64)]) -> f64 {
         .chain(layers.iter().map(|layer| layer.0))
         .chain([1.0])
         .collect();
-    // Of what lies before the layer: what it reflects to the front and to the back, and passes.
+    // Reflectance to the front and to the back, and transmittance, of the layers in front.
     let r = fresnel(iors[0], iors[1]);
     let (mut front, mut back, mut passed) = (r, r, 1.0 - r);
     for (i, (_, keeps)) in layers.iter().enumerate() {
@@ -106,13 +106,13 @@ fn assert_seen(expected: f64, tolerance: f64, what: &str, bodies: &[Body]) {
     }
 }
 
-/// Indices of 1 leave nothing but absorption, along a length that is known.
+/// With indices of 1 only absorption remains, along a known length.
 #[test]
 fn liquid_that_overlaps_its_glass_absorbs_along_the_length_that_it_fills() {
     for overlap in [-1e-3, 0.0, 1e-3, 0.05] {
         let liquid = body(1.0, 0.5, 0.9 + overlap, None);
         let glass = body(1.0, 1.0, 1.0, Some(0.9));
-        // The glass has the smaller volume, and so is what is there.
+        // The glass has the smaller volume, and therefore counts.
         let length = 2.0 * f64::from(0.9f32.min(0.9 + overlap));
         assert_seen(
             0.5f64.powf(length),
@@ -123,8 +123,8 @@ fn liquid_that_overlaps_its_glass_absorbs_along_the_length_that_it_fills() {
     }
 }
 
-/// With an overlap of a thousandth the same as where they touch, and what its layers say. False alarms: the noise of 256 pixels
-/// after 64 iterations is .15 %.
+/// With an overlap of a thousandth the result is that of touching objects, and of the layers. False alarms: the noise of 256
+/// pixels after 64 iterations is .15 %.
 #[test]
 fn liquid_in_glass_looks_alike_whether_they_touch_or_overlap() {
     let expected = seen(&[(1.5, 1.0), (1.33, 0.5f64.powf(1.8)), (1.5, 1.0)]);
@@ -144,7 +144,7 @@ fn liquid_in_glass_looks_alike_whether_they_touch_or_overlap() {
     }
 }
 
-/// Between air and liquid there is a gap, if small: two boundaries more.
+/// Between air and liquid there is a small gap: two more boundaries.
 #[test]
 fn a_gap_between_liquid_and_glass_is_two_boundaries_more() {
     let air = (1.0, 1.0);
@@ -153,8 +153,7 @@ fn a_gap_between_liquid_and_glass_is_two_boundaries_more() {
     assert_seen(expected, 0.01, "gap", &bodies);
 }
 
-/// A block of glass in water without touching its surface: the boundary is that between glass and water, and water absorbs on
-/// both sides of it.
+/// A block of glass inside water: the boundary is that between glass and water, and water absorbs on both sides.
 #[test]
 fn glass_under_water_is_in_water() {
     let side = (1.33, 0.4f64.powf(0.5));
@@ -163,7 +162,7 @@ fn glass_under_water_is_in_water() {
     assert_seen(expected, 0.01, "submerged", &bodies);
 }
 
-/// The walls of a glass may be meshes of their own, of materials of their own.
+/// The walls of a glass may be separate meshes with separate materials.
 #[test]
 fn a_glass_of_several_meshes_keeps_the_colour_of_the_liquid_pushed_into_it() {
     let expected = seen(&[(1.5, 1.0), (1.33, 0.5f64.powf(1.8)), (1.5, 1.0)]);
@@ -175,7 +174,7 @@ fn a_glass_of_several_meshes_keeps_the_colour_of_the_liquid_pushed_into_it() {
     assert_seen(expected, 0.01, "walls apart", &bodies);
 }
 
-/// A bubble may be a mesh of its own whose fronts look inwards: behind it is air, not glass.
+/// A bubble may be a separate mesh whose fronts face inwards: behind it is air, not glass.
 #[test]
 fn a_bubble_with_its_fronts_inside_is_air() {
     let expected = seen(&[(1.5, 0.4f64.powf(0.5)), (1.0, 1.0), (1.5, 0.4f64.powf(0.5))]);

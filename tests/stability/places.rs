@@ -28,7 +28,7 @@ fn picture_under(mut root: Value) -> Image {
     render(&scene, 0, 4, square(48, 20_000)).image
 }
 
-/// The room is 2 wide. No chance is in it: one seed, one device, and render space the same but for rounding.
+/// The room is 2 wide. Nothing is random: one seed, one device, and render space the same except for rounding.
 fn assert_same_picture(turned: Option<[f64; 4]>) {
     let under = |mut root: Value| {
         if let Some(rotation) = turned {
@@ -55,8 +55,8 @@ fn a_scene_ten_million_sizes_away_or_a_thousand_times_as_large_or_small_gives_th
     assert_same_picture(None);
 }
 
-/// A turned scene has coordinates of all bits, which a place far away rounds: to 3.7e-9 at 2e7, a sixteenth of what f32
-/// resolves in render space.
+/// A rotated scene has coordinates that use all bits, which are rounded far from the origin: to 3.7e-9 at 2e7, a sixteenth of the
+/// resolution of f32 in render space.
 #[test]
 fn so_does_a_turned_scene_whose_coordinates_are_rounded_there() {
     assert_same_picture(Some([0.1825742, 0.3651484, 0.5477226, 0.7302967]));

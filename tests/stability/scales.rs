@@ -1,5 +1,5 @@
-//! Things of very different size in one scene: rays leave a surface without meeting it again, and without jumping over
-//! what is beside it.
+//! Objects of very different size in one scene: rays leave a surface without hitting it again, and without missing a nearby
+//! object.
 
 use glam::Vec3;
 
@@ -11,8 +11,8 @@ const WALL: f32 = 1e4;
 /// Radius of the ball beside it.
 const BALL: f32 = 1e-4;
 
-/// A room around the ball, beside the wall and a hundred-millionth of its size. What comes in from outside, or gets out, is
-/// missing or too much: the wall shines a thousand times brighter, or not at all.
+/// A room around the ball, next to the wall and 10⁸ times smaller. Light that leaks in or out is visible: the wall emits a
+/// thousand times more, or nothing.
 fn room_beside_a_wall(wall_radiance: f32) -> Model {
     let mut model = Model::new();
     let wall = model.black(wall_radiance);
@@ -43,7 +43,7 @@ fn a_ball_a_hundred_million_times_smaller_than_the_room_has_no_acne() {
     assert_lit_by_shadow_rays("ball in the middle of a room", &model.scene(), 0, 1.0);
 }
 
-/// Away from the middle positions are coarser: 6e-8 of the distance.
+/// Away from the middle positions are less precise: 6e-8 of the distance.
 #[test]
 fn small_balls_in_the_corner_of_a_room_have_no_acne() {
     for radius in [0.1, 1e-2, 1e-3, 1e-4] {

@@ -1,4 +1,4 @@
-//! Renders whose every buffer is searched for what must not be there.
+//! Renders whose buffers are all searched for invalid values.
 
 use ppm_vk::internals::backend::{Backend, Counters};
 use ppm_vk::internals::config::RenderConfig;
@@ -20,20 +20,20 @@ pub fn square(side: u32, photons: u32) -> RenderConfig {
     }
 }
 
-/// What a render of some iterations gave.
+/// The results of a render.
 pub struct Rendered {
     pub image: Image,
     pub counters: Counters,
     pub renderer: Renderer,
 }
 
-/// Renders what a camera of a scene sees. All buffers are sound, and nothing was left out but paths that are too long.
+/// Renders the view of a scene's camera. All buffers are valid, and nothing was left out except paths that are too long.
 #[track_caller]
 pub fn render(scene: &Scene, camera: usize, iterations: u32, config: RenderConfig) -> Rendered {
     render_within(None, scene, camera, iterations, config)
 }
 
-/// The same with photon buffers of so many bytes at the most.
+/// The same with photon buffers of at most this size in bytes.
 #[track_caller]
 pub fn render_within(
     bytes: Option<u64>,
@@ -83,7 +83,8 @@ fn photons(renderer: &mut Renderer) -> Vec<Photon> {
         .expect("photons")
 }
 
-/// Makes the picture; no NaN, infinity or negative value is in it or in what it was made from, and none was left out.
+/// Resolves the picture. It contains no NaN, infinity or negative value, nor do the buffers that it is made of, and none was left
+/// out.
 #[track_caller]
 pub fn assert_sound(renderer: &mut Renderer) -> Image {
     let image = renderer.resolve().expect("a picture");
@@ -148,7 +149,7 @@ fn assert_amounts(what: &str, values: impl Iterator<Item = [f32; 3]>) {
     }
 }
 
-/// Mean of samples that are independent of each other, and its standard deviation.
+/// Mean of independent samples, and its standard deviation.
 pub fn mean_of(samples: &[f64]) -> (f64, f64) {
     let n = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / n;
@@ -156,8 +157,8 @@ pub fn mean_of(samples: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// Checks the mean of independent samples. Past 6 standard deviations of the mean, measured from the samples themselves,
-/// chance is 2 in 10⁹, and less than 10⁻⁶ for all comparisons of a test; what `known` says is added: an error that has a bound and no chance in it.
+/// Checks the mean of independent samples. The probability of exceeding 6 standard deviations of the mean, measured from the
+/// samples, is 2 in 10⁹, and below 10⁻⁶ for all comparisons of a test. `known`: a bound of the systematic error, which is added.
 #[track_caller]
 pub fn assert_mean(what: &str, samples: &[f64], expected: f64, known: f64) {
     let (mean, deviation) = mean_of(samples);

@@ -1,4 +1,4 @@
-//! Equations 2 and 3 over very many iterations and photons, and at the ends of α's range.
+//! Equations 2 and 3 over very many iterations and photons, and at the limits of α.
 
 use bytemuck::Zeroable;
 use ppm_vk::internals::config::{RenderConfig, Totals};
@@ -57,7 +57,7 @@ impl Exact {
         if photons > 0.0 {
             let n = alpha * self.accepted;
             let ratio = (n + alpha * photons) / (n + photons);
-            // Where R² stops, τ grows as it does at a radius that is kept.
+            // If R² does not shrink, τ grows as with a constant radius.
             let ratio = if self.radius2 * ratio < 1e-24 { 1.0 } else { ratio };
             self.radius2 *= ratio;
             self.tau = (self.tau + photons) * ratio;
@@ -98,7 +98,7 @@ impl Exact {
     }
 }
 
-/// So many iterations, with M of each slot given by photons that all lie at the visible points, on the slot's object.
+/// This number of iterations; the photons all lie at the visible points, on the slot's object, so that M is given for each slot.
 fn iterate(bench: &mut Bench, iterations: u32, arriving: impl Fn(u32) -> u32) {
     let mut photons: Vec<Photon> = Vec::new();
     for slot in 0..SLOTS {
@@ -150,7 +150,7 @@ fn radius_and_flux_follow_equations_2_and_3_over_a_million_iterations() {
     assert_iterations_follow_equations_2_and_3(1_000_000);
 }
 
-/// Half a million photons at a time, which no gather of a test could find so often, are put where it puts them.
+/// Half a million photons per slot, more than a test can gather, are written directly to the gather's result.
 #[test]
 fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
     const ITERATIONS: u32 = 2000;
@@ -178,12 +178,12 @@ fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
     exact.assert(&at_a_billion[0], 1e-6, "10⁹ photons");
     let before = exact;
 
-    // From here on a photon changes R² by 5e-10 of it: less than the last bit of an f32. Yet they count.
+    // From here on a photon changes R² by 5e-10 of its value: less than the last bit of an f32. It still counts.
     let slowly = 2000;
     iterate(&mut bench, slowly, |slot| u32::from(slot == 0));
     (0..slowly).for_each(|_| exact.add(1.0, bench.config.alpha.into()));
     let found: Vec<Statistics> = bench.download(BufferId::StatisticsOf);
-    exact.assert(&found[0], 1e-6, "10⁹ photons and two thousand, one at a time");
+    exact.assert(&found[0], 1e-6, "10⁹ photons and two thousand, one per iteration");
     let radius2 = |s: &Statistics| f64::from(s.radius2_high) + f64::from(s.radius2_low);
     let shrunk = 1.0 - radius2(&found[0]) / radius2(&at_a_billion[0]);
     let expected = 1.0 - exact.radius2 / before.radius2;
@@ -194,7 +194,7 @@ fn a_billion_photons_in_one_visible_point_and_one_more_are_all_counted() {
     assert_sound(&mut bench.renderer);
 }
 
-/// Photons of a render pass 2³² after a day. τ is what such a render would have of radiance 1.
+/// A render passes 2³² photons after a day. τ is that of such a render for radiance 1.
 #[test]
 fn pictures_stay_right_when_more_than_two_to_the_32_photons_were_emitted() {
     let mut bench = bench(2.0 / 3.0);
@@ -258,7 +258,7 @@ fn a_visible_point_that_no_photon_ever_reaches_keeps_its_radius_and_stays_dark()
 fn one_photon_for_ever_and_alpha_next_to_0_and_1_leave_a_radius_and_the_right_flux_over_it() {
     for alpha in [1e-6, 0.5, 1.0 - 1e-6] {
         let mut bench = bench(alpha);
-        // Slot 0: one photon a time; 1: seven; 2: none but the first.
+        // Slot 0: one photon per iteration; 1: seven; 2: only the first.
         iterate(&mut bench, 1, |slot| [1, 7, 1][slot as usize % 3]);
         let rest = 2000;
         iterate(&mut bench, rest, |slot| [1, 7, 0][slot as usize % 3]);
@@ -267,7 +267,11 @@ fn one_photon_for_ever_and_alpha_next_to_0_and_1_leave_a_radius_and_the_right_fl
             let mut exact = Exact::START;
             exact.add(if slot == 1 { 7.0 } else { 1.0 }, alpha.into());
             (0..rest).for_each(|_| exact.add(later, alpha.into()));
-            exact.assert(&found[slot], 1e-6, &format!("α = {alpha}, then {later} photons a time"));
+            exact.assert(
+                &found[slot],
+                1e-6,
+                &format!("α = {alpha}, then {later} photons per iteration"),
+            );
         }
         assert_sound(&mut bench.renderer);
     }

@@ -1,5 +1,5 @@
-//! A matte ball in a room whose walls shine and reflect nothing. The ball is convex, so all that it receives is the walls'
-//! light: π · L on every part of its surface, and its radiance is albedo · L wherever one looks at it.
+//! A matte ball in a room whose walls emit and reflect nothing. The ball is convex, so that it receives only the walls' light: π
+//! · L on every part of its surface. Its radiance is albedo · L everywhere.
 
 use std::f64::consts::PI;
 
@@ -31,7 +31,7 @@ pub fn add_ball(model: &mut Model, centre: Vec3, radius: f32) {
     );
 }
 
-/// What the camera sees of the ball. Each pixel draws its own shadow rays, so the pixels are independent of each other.
+/// The visible radiance of the ball. Each pixel draws its own light samples, so that the pixels are independent of each other.
 #[track_caller]
 pub fn assert_lit_by_shadow_rays(what: &str, scene: &Scene, camera: usize, radiance: f32) {
     let rendered = render(scene, camera, 8, square(64, 1000));
@@ -40,7 +40,7 @@ pub fn assert_lit_by_shadow_rays(what: &str, scene: &Scene, camera: usize, radia
     assert_mean(&format!("{what}, by shadow rays"), &samples, ALBEDO.into(), 1e-6);
 }
 
-/// What photons bring to the balls, in the order of the objects. Paths are independent of each other, and each brings one
+/// Flux that photons carry to the balls, in the order of the objects. Paths are independent of each other, and each carries one
 /// photon to a ball, or none.
 #[track_caller]
 pub fn assert_lit_by_photons(what: &str, scene: &Scene, radiances: &[f32]) {

@@ -14,14 +14,14 @@ const NEAREST: u32 = 9728;
 const LINEAR: u32 = 9729;
 const REPEAT: u32 = 10497;
 
-/// How texels become a value; the number of the sampler.
+/// How texels become a value; the index of the sampler.
 #[derive(Clone, Copy)]
 pub enum Filter {
     Nearest = 0,
     Linear = 1,
 }
 
-/// An image of this size as PNG, by a formula for its texels, RGBA.
+/// A PNG of this size, by a function of the texel's position that returns RGBA.
 pub fn png(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Vec<u8> {
     let mut png = std::io::Cursor::new(Vec::new());
     image::RgbaImage::from_fn(width, height, |x, y| image::Rgba(texel(x, y)))
@@ -67,7 +67,7 @@ pub fn mirror(name: &str, [r, g, b]: [f64; 3]) -> Value {
     })
 }
 
-/// A dielectric of index 1.5, of which a part is clear; attenuation colour and distance inside, or a thin wall.
+/// A dielectric of index 1.5, partly transmissive; with attenuation colour and distance inside, or a thin wall.
 pub fn glass(name: &str, roughness: f64, transmission: f64, inside: Option<([f64; 3], f64)>) -> Value {
     let mut material = metallic_roughness(name, [1.0; 3], 0.0, roughness);
     material["extensions"] = json!({ "KHR_materials_transmission": { "transmissionFactor": transmission } });
@@ -79,7 +79,7 @@ pub fn glass(name: &str, roughness: f64, transmission: f64, inside: Option<([f64
     material
 }
 
-/// A surface of microfacets.
+/// A metallic-roughness surface.
 pub fn metallic_roughness(name: &str, [r, g, b]: [f64; 3], metallic: f64, roughness: f64) -> Value {
     json!({
         "name": name,
@@ -102,7 +102,7 @@ pub fn clear(name: &str, ior: f64) -> Value {
     })
 }
 
-/// `material`, emitting `radiance` as well. glTF's factor ends at 1; an extension carries what is above.
+/// `material`, also emitting `radiance`. glTF's factor is at most 1; larger values use an extension.
 pub fn emitting(mut material: Value, radiance: [f64; 3]) -> Value {
     let strength = radiance.into_iter().fold(1.0, f64::max);
     material["emissiveFactor"] = json!(radiance.map(|value| value / strength));
@@ -112,13 +112,13 @@ pub fn emitting(mut material: Value, radiance: [f64; 3]) -> Value {
     material
 }
 
-/// `material` whose back doesn't emit, and is hidden from cameras.
+/// `material` whose back does not emit, and is hidden from cameras.
 pub fn one_sided(mut material: Value) -> Value {
     material["doubleSided"] = json!(false);
     material
 }
 
-/// A glTF document being put together. What is added gets the next index of its kind.
+/// A glTF document under construction. A new element gets the next index of its kind.
 pub struct Document {
     name: &'static str,
     nodes: Vec<Value>,
@@ -196,12 +196,12 @@ impl Document {
         push(&mut self.meshes, json!({ "name": name, "primitives": [primitive] }))
     }
 
-    /// Adds a node that shows a mesh; any number may.
+    /// Adds a node that shows a mesh; several nodes may show the same mesh.
     pub fn again(&mut self, name: &str, mesh: usize) -> Node<'_> {
         self.node(json!({ "name": name, "mesh": mesh }))
     }
 
-    /// Adds a node that is the parent of the last so many.
+    /// Adds a node that is the parent of this number of last nodes.
     pub fn group(&mut self, name: &str, count: usize) -> Node<'_> {
         let children: Vec<usize> = (self.nodes.len() - count..self.nodes.len()).collect();
         self.node(json!({ "name": name, "children": children }))
@@ -219,7 +219,7 @@ impl Document {
         node.at(eye.to_array()).towards(target - eye);
     }
 
-    /// The same without perspective, which shows so much of either side of `target`.
+    /// The same with an orthographic projection, showing this much on either side of `target`.
     pub fn parallel_camera(&mut self, eye: [f64; 2], target: [f64; 2], half_side: f64) {
         let lens = json!({ "xmag": half_side, "ymag": half_side, "znear": 0.01, "zfar": 1000.0 });
         let camera = json!({ "name": "camera", "type": "orthographic", "orthographic": lens });
@@ -233,7 +233,7 @@ impl Document {
         node.at([0.0, eye[0], eye[1]]).rotated([1.0, 0.0, 0.0], pitch);
     }
 
-    /// Adds a light of KHR_lights_punctual and a node that has it; it shines along −z.
+    /// Adds a light of KHR_lights_punctual and its node; it emits along −z.
     pub fn punctual(&mut self, light: Value) -> Node<'_> {
         let light = push(&mut self.lights, light);
         self.node(json!({ "extensions": { "KHR_lights_punctual": { "light": light } } }))
@@ -311,7 +311,7 @@ impl Document {
                 .iter()
                 .copied()
                 .reduce(|a, b| std::array::from_fn(|i| pick(a[i], b[i])));
-            // Adding 0 makes −0, of which `min` and `max` take either, 0.
+            // Adding 0 turns −0 into 0. `min` and `max` may return either.
             bound.map(|bound| bound.map(|value| f64::from(value) + 0.0).to_vec())
         };
         let accessor = json!({
@@ -367,7 +367,7 @@ impl Node<'_> {
         self
     }
 
-    /// Turns its −z along `direction`, before the translation, with x level.
+    /// Turns its −z along `direction`, before the translation, with x horizontal.
     pub fn towards(&mut self, direction: DVec3) -> &mut Self {
         let back = -direction.normalize();
         let right = DVec3::Y.cross(back).normalize();

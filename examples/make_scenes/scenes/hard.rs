@@ -1,4 +1,4 @@
-//! Scenes in which nearly all photons miss what the camera sees, unless they are aimed.
+//! Scenes in which nearly all photons miss the visible surfaces, unless they are aimed.
 
 use glam::{DVec3, dvec3};
 use serde_json::json;
@@ -6,7 +6,7 @@ use serde_json::json;
 use super::document::{Document, clear, light, matte, metallic_roughness, mirror};
 use super::mesh::Mesh;
 
-/// Index of the glass in these scenes.
+/// Index of refraction of the glass in these scenes.
 const GLASS: f64 = 1.5;
 
 /// A glass ball on a table in the sun.
@@ -37,25 +37,25 @@ fn ball_in_the_sun(name: &'static str, half_side: f64) -> Document {
 pub fn sun_room() -> Document {
     let mut scene = room_in_a_courtyard("sun-room", 50.0, SUN);
     let pane = scene.material(clear("pane", GLASS));
-    // The pane reaches into the wall, so that no gap is left and no faces coincide.
+    // The pane reaches into the wall, so that there is no gap and no coincident faces.
     let [min, max] = [WINDOW[0] - dvec3(0.0, 0.01, 0.01), WINDOW[1] + dvec3(0.0, 0.01, 0.01)];
     let pane_of_glass = Mesh::cuboid(min.with_x(2.1), max.with_x(2.12));
     scene.object("pane", &pane_of_glass, pane);
     scene
 }
 
-/// The same room without the pane, the sun weaker by what that reflects of it.
+/// The same room without the pane, the sun weakened by the pane's reflection.
 pub fn sun_room_open() -> Document {
     let reflected = reflectance(-TO_ROOM.normalize().x, GLASS);
-    // Light goes to and fro between the pane's two faces.
+    // Light is reflected between the pane's two faces.
     room_in_a_courtyard("sun-room-open", 50.0, SUN * (1.0 - reflected) / (1.0 + reflected))
 }
 
-/// Where the sun's light goes in the room, and its irradiance.
+/// Direction of the sun's light in the room, and its irradiance.
 const TO_ROOM: DVec3 = dvec3(-1.0, -0.8, 0.15);
 const SUN: f64 = 20.0;
 
-/// Fresnel's reflectance of unpolarised light for a cosine and a relative index.
+/// Fresnel reflectance of unpolarised light for a cosine and a relative index.
 fn reflectance(cosine: f64, index: f64) -> f64 {
     let inside = (1.0 - (1.0 - cosine * cosine) / (index * index)).sqrt();
     let across = (cosine - index * inside) / (cosine + index * inside);
@@ -116,7 +116,7 @@ fn sun(scene: &mut Document, direction: DVec3, irradiance: f64) {
     scene.punctual(sun).towards(direction);
 }
 
-/// A ring of gold in a floor, under a lamp of 60 cm in a distance of 25 m.
+/// A golden ring in a floor, under a lamp of 60 cm at a distance of 25 m.
 pub fn far_lamp() -> Document {
     let mut scene = Document::new("far-lamp");
     let floor = scene.material(matte("floor", [0.75; 3]));
@@ -159,7 +159,7 @@ pub fn many_lamps() -> Document {
         let [x, z] = [x, z].map(|cell| CELL * (f64::from(cell) + 0.5) - half);
         scene.again("lamp", lamps).at([x, 0.0, z]);
     }
-    // What is seen: the cell between x = 0, z = 0 and x = CELL, z = CELL.
+    // The visible cell: between x = 0, z = 0 and x = CELL, z = CELL.
     scene
         .object("block", &slab(0.3, 0.0005, 0.7), plaster)
         .at([1.7, 0.0, 0.8])

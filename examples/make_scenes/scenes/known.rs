@@ -1,4 +1,4 @@
-//! Scenes whose pictures are known without rendering them.
+//! Scenes whose pictures are known in closed form.
 
 use glam::{DVec3, dvec3};
 
@@ -15,7 +15,7 @@ pub fn furnace_diffuse() -> Document {
     scene
 }
 
-/// A glass and a mirror sphere, neither of which absorbs, in a box of radiance 1.
+/// A glass and a mirror sphere without absorption, in a box of radiance 1.
 pub fn furnace_specular() -> Document {
     let mut scene = furnace("furnace-specular");
     let glass = scene.material(clear("glass", 1.5));
@@ -53,7 +53,7 @@ pub fn light_area() -> Document {
     scene
 }
 
-/// A black room with a luminous ceiling and a grey floor, part of which lies under water.
+/// A black room with an emissive ceiling and a grey floor, part of which lies under water.
 pub fn slab() -> Document {
     const HEIGHT: f64 = 2.0;
     let mut scene = Document::new("slab");

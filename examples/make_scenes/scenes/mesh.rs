@@ -10,9 +10,9 @@ pub struct Mesh {
     pub positions: Vec<DVec3>,
     /// Unit shading normals.
     pub normals: Vec<DVec3>,
-    /// Texture coordinates; empty where there are none.
+    /// Texture coordinates; may be empty.
     pub texcoords: Vec<DVec2>,
-    /// Colours, linear; empty where there are none.
+    /// Colours, linear; may be empty.
     pub colors: Vec<DVec3>,
     pub triangles: Vec<[u16; 3]>,
 }
@@ -42,8 +42,8 @@ impl Mesh {
     }
 
     /// Adds two triangles for each cell between the rows of `cells + 1` vertices that start at `a` and `b`; the diagonal
-    /// runs from `a`'s far vertex to `b`'s near one. Seen from the front, `b` is to the left of who walks along `a`;
-    /// to the right where it is to `flip`.
+    /// runs from `a`'s far vertex to `b`'s near one. Seen from the front, `b` is to the left of the direction along `a`, or to
+    /// the right with `flip`.
     fn push_strip(&mut self, a: u16, b: u16, cells: u16, flip: bool) {
         for cell in 0..cells {
             let (a, b) = (a + cell, b + cell);
@@ -171,7 +171,7 @@ impl Mesh {
         }
     }
 
-    /// The wall of a column around the y axis, seen from outside; the texture goes round it `times`.
+    /// The wall of a column around the y axis, seen from outside; the texture is repeated `times` around it.
     pub fn column(radius: f64, height: f64, segments: u16, times: f64) -> Self {
         let mut mesh = Self::default();
         for y in [0.0, height] {
@@ -187,7 +187,7 @@ impl Mesh {
         mesh
     }
 
-    /// A horizontal square that faces up, of `cells` × `cells` cells, coloured at their corners by x and z.
+    /// A horizontal square that faces up, of `cells` × `cells` cells, with vertex colours by x and z.
     pub fn colored(half_side: f64, cells: u16, color: impl Fn(f64, f64) -> DVec3) -> Self {
         let along = |step: u16| -half_side + 2.0 * half_side * f64::from(step) / f64::from(cells);
         let row = cells + 1;
@@ -205,7 +205,7 @@ impl Mesh {
     /// A ring around the y axis with a rectangular section from `inner` to `outer` radius and `bottom` to `top`.
     pub fn ring(inner: f64, outer: f64, bottom: f64, top: f64, segments: u16) -> Self {
         let mut mesh = Self::default();
-        // Each side: two circles (radius, height), the normal (radial, vertical), and whether its strip is to flip.
+        // Each side: two circles (radius, height), the normal (radial, vertical), and `flip` of its strip.
         for (circles, (radial, vertical), flip) in [
             ([(outer, bottom), (outer, top)], (1.0, 0.0), true),
             ([(inner, bottom), (inner, top)], (-1.0, 0.0), false),
@@ -242,7 +242,7 @@ impl Mesh {
             mesh.push_strip(z * row, (z + 1) * row, cells, true);
         }
 
-        // The sides, each along one edge of the surface: its first vertex, and the step to the next. They go once round.
+        // The sides, each along one edge of the surface: its first vertex, and the step to the next. They form a loop.
         let (last, stride) = (i32::from(cells), i32::from(row));
         let edges = [
             (0, 1, DVec3::NEG_Z),
@@ -278,7 +278,7 @@ impl Mesh {
         mesh
     }
 
-    /// The same surface seen from the other side.
+    /// The same surface, facing the other side.
     pub fn flipped(mut self) -> Self {
         for normal in &mut self.normals {
             *normal = -*normal;

@@ -1,4 +1,4 @@
-//! The project's own scenes. Units are metres, y is up; radiance is linear RGB.
+//! The scenes of this repository. Units are metres, y is up; radiance is linear RGB.
 
 mod document;
 mod hard;
@@ -50,12 +50,12 @@ pub fn all() -> Vec<File> {
     .collect()
 }
 
-/// The Cornell box after its fashion: matte walls, a square light, two blocks.
+/// A Cornell box: matte walls, a square light, two blocks.
 fn cornell() -> Document {
     let mut scene = cornell_room("cornell");
     let white = scene.material(matte("box", WHITE));
     let block = |height: f64| Mesh::cuboid(dvec3(-0.3, 0.0, -0.3), dvec3(0.3, height, 0.3));
-    // The gap keeps the blocks' lower sides off the floor.
+    // The gap separates the blocks' lower sides from the floor.
     let mut tall = scene.object("tall", &block(1.2), white);
     tall.at([-0.35, 0.0005, -0.3])
         .rotated([0.0, 1.0, 0.0], 18_f64.to_radians());
@@ -80,7 +80,7 @@ fn ring() -> Document {
     scene
 }
 
-/// Wavy water over a floor, under a small light: caustics seen through the surface that made them.
+/// Wavy water over a floor, under a small light: caustics seen through the surface that causes them.
 fn pool(name: &'static str, tiles: bool) -> Document {
     const HEIGHT: f64 = 2.6;
     let mut scene = Document::new(name);
@@ -100,7 +100,7 @@ fn pool(name: &'static str, tiles: bool) -> Document {
     }
     scene.object("ceiling", &Mesh::facing_down(ROOM, HEIGHT), white);
     scene.object("light", &Mesh::facing_down(0.08, HEIGHT - 0.002), lamp);
-    // The water reaches into the walls and the floor, so that no gap is left and no faces coincide.
+    // The water reaches into the walls and the floor, so that there is no gap and no coincident faces.
     let body = Mesh::body_of_liquid(ROOM + 0.03, -0.03, 96, waves);
     scene.object("water", &body, water);
     scene.camera([2.15, 0.93], [0.25, -0.25], 62.0);
@@ -125,7 +125,7 @@ fn waves(x: f64, z: f64) -> [f64; 3] {
         })
 }
 
-/// One tile with half its joint, 8 × 8 texels.
+/// One tile with half of its joints, 8 × 8 texels.
 fn tile_png() -> Vec<u8> {
     png(8, 8, |x, y| {
         if x == 0 || y == 0 {
@@ -136,7 +136,7 @@ fn tile_png() -> Vec<u8> {
     })
 }
 
-/// Normals of a round stud.
+/// A normal map of a round stud.
 fn stud_png() -> Vec<u8> {
     png(32, 32, |x, y| {
         let at = |place: u32| (f64::from(place) + 0.5) / 16.0 - 1.0;
@@ -148,8 +148,8 @@ fn stud_png() -> Vec<u8> {
     })
 }
 
-/// The same room with a few meshes that many nodes show: turned, stretched, mirrored, in turned and stretched groups; glass
-/// that stands on the floor, and one in the other.
+/// The same room with a few meshes that many nodes show: rotated, stretched, mirrored, in rotated and stretched groups; glass
+/// that stands on the floor, and one glass inside another.
 fn instances() -> Document {
     const UP: [f64; 3] = [0.0, 1.0, 0.0];
     let tilted = DVec3::new(1.0, 2.0, 2.0).normalize().to_array();
@@ -195,8 +195,8 @@ fn instances() -> Document {
     scene
 }
 
-/// The same room with a checkered floor, a wall of studs, a fence, a pane of smoke, a ball of metal and plaster, and a lamp of
-/// two colours: every kind of texture.
+/// The same room with a checkered floor, a studded wall, a fence, a half transparent pane, a ball of metal and plaster, and a
+/// lamp of two colours: every kind of texture.
 fn textures() -> Document {
     let mut scene = cornell_room("textures");
     let color = "/pbrMetallicRoughness/baseColorTexture";
@@ -273,7 +273,7 @@ fn textures() -> Document {
     scene
 }
 
-/// A glass and a matte sphere under a lamp, a spotlight and the sun, none of which has an extent.
+/// A glass and a matte sphere under a point light, a spotlight and a sun, all without extent.
 fn lights() -> Document {
     let mut scene = Document::new("lights");
     let floor = scene.material(matte("floor", [0.7; 3]));
@@ -295,8 +295,8 @@ fn lights() -> Document {
     scene
 }
 
-/// Things under punctual lights, seen without perspective: enamel with a coloured reflection, an alloy, polished metal, a studded
-/// column, a thin frosted pane, ground with colours at its corners. Nothing there is smooth: a path tracer finds all light.
+/// Objects under punctual lights, with an orthographic camera: enamel with a coloured reflection, an alloy, polished metal, a
+/// studded column, a thin frosted pane, ground with vertex colours. Nothing is smooth, so that a path tracer finds all light.
 fn plaza() -> Document {
     let mut scene = Document::new("plaza");
     let ground = scene.material(matte("ground", [0.8; 3]));
@@ -345,7 +345,7 @@ fn plaza() -> Document {
     scene
 }
 
-/// The Cornell box without what stands in it.
+/// The empty Cornell box.
 fn cornell_room(name: &'static str) -> Document {
     const HEIGHT: f64 = 2.0;
     let mut scene = Document::new(name);
@@ -363,7 +363,7 @@ fn cornell_room(name: &'static str) -> Document {
     scene
 }
 
-/// The walls of a room, facing inward, with their names: back, left, right, front.
+/// The walls of a room, facing inwards, with their names: back, left, right, front.
 fn walls(height: f64) -> [(&'static str, Mesh); 4] {
     // From the lower left corner to the lower right one, seen from inside.
     [

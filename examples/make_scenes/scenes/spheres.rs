@@ -1,4 +1,4 @@
-//! The Cornell room with spheres in it.
+//! The Cornell box with spheres.
 
 use glam::dvec3;
 use serde_json::{Value, json};
@@ -47,7 +47,7 @@ pub fn glossy() -> Document {
     )
 }
 
-/// The same room with spheres of tinted, frosted, thin and half clear glass.
+/// The same room with spheres of tinted, frosted, thin and half transmissive glass.
 pub fn glasses() -> Document {
     four_spheres(
         "glasses",
@@ -60,7 +60,7 @@ pub fn glasses() -> Document {
     )
 }
 
-/// The same room with coats on spheres of lacquer, metal and glass, a gem that reflects in blue, and a wall whose coat is
+/// The same room with coats on spheres of lacquer, metal and glass, a gem with a blue reflection, and a wall whose coat varies:
 /// in patches, scratched and studded.
 pub fn coats() -> Document {
     const COAT: &str = "KHR_materials_clearcoat";
