@@ -6,8 +6,9 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 
 use super::buffer::Buffer;
-use super::context::{Context, DeviceSummary, VulkanInstance};
+use super::context::Context;
 use super::descriptors::Descriptors;
+use super::instance::{DeviceSummary, VulkanInstance};
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
 use super::ray_tracing::Acceleration;

@@ -7,6 +7,7 @@ mod context;
 mod descriptors;
 mod device;
 mod execute;
+mod instance;
 mod pipeline;
 mod pipeline_cache;
 mod ray_tracing;
@@ -14,9 +15,9 @@ mod self_check;
 mod statistics;
 mod submission;
 
-pub use context::DeviceSummary;
 pub(crate) use device::remedy;
 pub use device::{Device, best_device, devices};
 pub use execute::{Done, Ticket};
+pub use instance::DeviceSummary;
 pub(crate) use ray_tracing::no_ray_query;
 pub use statistics::Compiler;

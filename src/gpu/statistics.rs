@@ -3,8 +3,9 @@
 
 use ash::{khr, vk};
 
-use super::context::{Context, DeviceSummary, OrVulkan, VulkanInstance};
+use super::context::{Context, OrVulkan};
 use super::device::choose;
+use super::instance::{DeviceSummary, VulkanInstance};
 use super::pipeline::Pipelines;
 use super::pipeline_cache::PipelineCache;
 use crate::error::{Error, Remedy, Result};
