@@ -1,8 +1,11 @@
 //! Learns cells and their probabilities from the values of paths.
 
+mod cell;
+
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
+use self::cell::{BINS, Cell, Counts, Cut, PRIOR};
 use super::path_value::PathValue;
 use super::strata::{Stratum, strata};
 use super::table::{Chosen, DIMENSIONS, Table};
@@ -27,26 +30,14 @@ const WORTH_IT: f64 = 2.5;
 /// Maximum average number of rays per path, if paths by power take fewer. Paths that are aimed at glass take many: some of them
 /// are not traced, and the others carry their flux.
 const FEWEST_RAYS: f64 = 4.0;
-/// Rays and starts that each cell is assumed to have had before, with the average value.
-const PRIOR: f64 = 16.0;
 /// Clamp of a path's value, as a multiple of the median of the positive values: rare paths with much flux would mask the others.
 const MOST_VALUE: f64 = 1000.0;
 /// Maximum factor by which an update changes the probability of a cell with many paths.
 const LARGEST_CHANGE: f64 = 16.0;
 /// Number of paths with which a cell may change by half of that.
 const TRUSTED: f64 = 32.0;
-/// Number of bins of a cell along each coordinate.
-const BINS: usize = 8;
-/// Minimum number of paths in a cell that is split.
-const CUT_PATHS: f64 = 64.0;
-/// Minimum share of the variance that a separate density for each bin would save, for a cell to be split.
-const CUT_CONTRAST: f64 = 0.04;
-/// Minimum χ² of the bins' values, with one degree of freedom less than bins: exceeded by chance in 1 of 1000 cases.
-const SIGNIFICANT: f64 = 24.0;
 /// Maximum number of successive splits of a cell in an update.
 const CUT_ROUNDS: usize = 8;
-/// Minimum width of a cell: random numbers have steps of 2⁻²⁴.
-const THINNEST: f32 = 1.0 / 65536.0;
 
 /// The iteration whose random numbers a pilot round uses. No render gets that far, and the search for radii uses others.
 fn pilot_iteration(round: u32) -> u32 {
@@ -62,86 +53,6 @@ pub fn is_learned_from(config: &RenderConfig, iteration: u32) -> bool {
 pub fn counted_paths(iteration: u32) -> u32 {
     let later = (LATER..pilot_iteration(PILOT_ROUNDS)).contains(&iteration);
     COUNTED_PATHS[usize::from(later)]
-}
-
-/// Statistics of a cell's paths: sums in path order, so that they have the same bits in every run.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Counts {
-    paths: f64,
-    value: f64,
-    rays: f64,
-    /// Σ value².
-    squares: f64,
-    /// Along each coordinate, the number of paths in equal bins of the cell.
-    paths_in: [[f64; BINS]; DIMENSIONS],
-    /// Sums of their values.
-    value_in: [[f64; BINS]; DIMENSIONS],
-}
-
-impl Counts {
-    /// Cost of its paths: one for each start, and one for each ray.
-    fn cost(&self) -> f64 {
-        self.paths + self.rays
-    }
-
-    /// Statistics with these shares of the paths and of the value, without distribution over bins.
-    fn part(&self, paths: f64, value: f64) -> Self {
-        Self {
-            paths: self.paths * paths,
-            value: self.value * value,
-            rays: self.rays * paths,
-            squares: self.squares * value,
-            paths_in: scaled(self.paths_in, paths),
-            value_in: scaled(self.value_in, value),
-        }
-    }
-
-    /// Statistics of the same paths with scaled values.
-    fn revalued(&self, factor: f64) -> Self {
-        Self {
-            value: self.value * factor,
-            squares: self.squares * factor * factor,
-            value_in: scaled(self.value_in, factor),
-            ..*self
-        }
-    }
-}
-
-fn scaled(sums: [[f64; BINS]; DIMENSIONS], factor: f64) -> [[f64; BINS]; DIMENSIONS] {
-    sums.map(|along| along.map(|sum| sum * factor))
-}
-
-/// The bins of half a cell, from the bins of the whole cell.
-fn of_half(sums: [f64; BINS], upper: bool) -> [f64; BINS] {
-    let first = if upper { BINS / 2 } else { 0 };
-    std::array::from_fn(|part| 0.5 * sums[first + part / 2])
-}
-
-/// A box of a stratum's starts.
-#[derive(Debug, Clone)]
-struct Cell {
-    stratum: usize,
-    low: [f32; DIMENSIONS],
-    size: [f32; DIMENSIONS],
-    probability: f64,
-    /// Probability that a path starts in it.
-    density: f64,
-    counts: Counts,
-}
-
-impl Cell {
-    fn volume(&self) -> f64 {
-        self.size.iter().map(|&side| f64::from(side)).product()
-    }
-}
-
-/// The split of a cell.
-#[derive(Debug, Clone, Copy)]
-struct Cut {
-    dimension: usize,
-    /// Share of the cell's probability for the lower half.
-    lower: f64,
-    contrast: f64,
 }
 
 /// Mean value and mean number of rays of paths.
@@ -326,66 +237,22 @@ impl Aim {
     fn cut(&mut self) {
         let cells = self.cells.iter().enumerate();
         let mut cuts: Vec<(usize, Cut)> = cells
-            .filter_map(|(index, cell)| Some((index, self.best_cut(cell)?)))
+            .filter_map(|(index, cell)| Some((index, cell.best_cut(self.usable_dimensions(cell))?)))
             .collect();
         let gain = |&(index, cut): &(usize, Cut)| self.cells[index].probability * cut.contrast;
         cuts.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
         cuts.truncate(MOST_EMISSION_CELLS as usize - 1 - self.cells.len().min(MOST_EMISSION_CELLS as usize - 1));
-        for (index, Cut { dimension, lower, .. }) in cuts {
-            let whole = self.cells[index].clone();
-            let counts = &whole.counts;
-            let of_lower = |sums: &[f64; BINS]| sums[..BINS / 2].iter().sum::<f64>();
-            let paths = of_lower(&counts.paths_in[dimension]) / counts.paths;
-            let value = of_lower(&counts.value_in[dimension]) / counts.value;
-            let half = |upper: bool| {
-                let part = |lower: f64| if upper { 1.0 - lower } else { lower };
-                let mut cell = whole.clone();
-                cell.size[dimension] *= 0.5;
-                if upper {
-                    cell.low[dimension] += cell.size[dimension];
-                }
-                cell.probability *= part(lower);
-                cell.counts = counts.part(part(paths), part(value));
-                cell.counts.paths_in[dimension] = of_half(counts.paths_in[dimension], upper);
-                cell.counts.value_in[dimension] = of_half(counts.value_in[dimension], upper);
-                cell
-            };
-            self.cells[index] = half(false);
-            self.cells.push(half(true));
+        for (index, cut) in cuts {
+            let [lower, upper] = self.cells[index].halves(cut);
+            self.cells[index] = lower;
+            self.cells.push(upper);
         }
     }
 
-    fn best_cut(&self, cell: &Cell) -> Option<Cut> {
-        let counts = &cell.counts;
-        if counts.paths < CUT_PATHS || counts.value == 0.0 {
-            return None;
-        }
+    /// The coordinates along which a cell can be split: the last one chooses among the lights of its source.
+    fn usable_dimensions(&self, cell: &Cell) -> usize {
         let one_light = self.strata[cell.stratum].lights.len() == 1;
-        let usable = if one_light { DIMENSIONS - 1 } else { DIMENSIONS };
-        let value = counts.value;
-        // The number of equal values with the same relative variance.
-        let effective = value * value / counts.squares;
-        let prior = PRIOR / BINS as f64;
-        let rate = |value: f64, paths: f64| (value + prior * counts.value / counts.paths) / (paths + prior);
-        let cuts = (0..usable).filter(|&dimension| cell.size[dimension] > THINNEST);
-        let cuts = cuts.filter_map(|dimension| {
-            let (paths, values) = (&counts.paths_in[dimension], &counts.value_in[dimension]);
-            let rates: [f64; BINS] = std::array::from_fn(|bin| rate(values[bin], paths[bin]));
-            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-            // Because the density is proportional to the root.
-            let contrast = 1.0 - mean(&rates.map(f64::sqrt)).powi(2) / mean(&rates);
-            let squares: f64 = values.iter().map(|part| (part / value).powi(2)).sum();
-            let chi2 = effective * (BINS as f64 * squares - 1.0);
-            let (lower, upper) = rates.split_at(BINS / 2);
-            let (a, b) = (mean(lower).sqrt(), mean(upper).sqrt());
-            let cut = Cut {
-                dimension,
-                lower: a / (a + b),
-                contrast,
-            };
-            (contrast > CUT_CONTRAST && chi2 > SIGNIFICANT).then_some(cut)
-        });
-        cuts.max_by(|a, b| a.contrast.total_cmp(&b.contrast))
+        if one_light { DIMENSIONS - 1 } else { DIMENSIONS }
     }
 
     /// Normalises the probabilities, each at least its floor, and builds the table.
