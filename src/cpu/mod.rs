@@ -1,7 +1,7 @@
 //! A plain progressive photon mapper in f64. It is the renderer of `--backend cpu`, the reference of the kernels' tests, and the
 //! paper's CPU version (with its k-d tree).
 //!
-//! `sampling`, `reflector`, `glass`, `bsdf`, `lights`, `environment`, `texture`, `intersect`, `interaction`, `gather` and
+//! `sampling`, `reflector`, `glass`, `bsdf`, `lights`, `emission`, `environment`, `texture`, `intersect`, `interaction`, `gather` and
 //! `statistics` (equations 2 to 4) are pure functions. Tests compare the kernels' functions with them through probes. `camera`,
 //! `photons`, `direct` and `renderer` make the algorithm of them. It converges to the kernels' picture, without their
 //! optimisations: learned emission tables, demand, separate estimates of reflections on glass, and a map for caustics.
@@ -13,6 +13,7 @@ mod camera;
 mod coverage;
 mod direct;
 mod dispersion;
+mod emission;
 mod environment;
 mod gather;
 mod glass;
@@ -34,11 +35,12 @@ pub use bsdf::{Branch, Bsdf, Width};
 pub use camera::{CameraPath, VisiblePoint};
 pub use coverage::{Place, can_have_photons, is_surrounded};
 pub use dispersion::ior_at;
+pub use emission::{Emission, choose_by_power, sample_emission};
 pub use environment::{Environment, EnvironmentSample};
 pub use gather::{DeviceReceivers, Gathered, Receiver, Receivers, gather_kd_tree, gather_naive};
 pub use glass::{DielectricSample, DielectricSamples, Glass};
 pub use intersect::{Hit, PlacedTriangle, Ray, nearest_hit};
-pub use lights::{Emission, LightSample, choose_by_power, punctual, sample_emission, sample_incident};
+pub use lights::{LightSample, punctual, sample_incident};
 pub use reflector::Reflector;
 pub use renderer::Renderer;
 pub use sampling::{cosine_direction, decode_direction, encode_direction};

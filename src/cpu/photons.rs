@@ -4,8 +4,9 @@ use glam::{DVec2, DVec3};
 
 use super::bsdf::choose;
 use super::dispersion::disperse;
+use super::emission::{Emission, choose_by_power, sample_emission};
 use super::interaction::Interaction;
-use super::lights::{Emission, choose_by_power, range_window, sample_emission};
+use super::lights::range_window;
 use super::media::{Media, transmittance};
 use super::sampling::encode_direction;
 use super::texture::nearest_visible;
