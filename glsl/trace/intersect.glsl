@@ -315,11 +315,11 @@ Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle igno
         bool push = false;
         bool pop = false;
         if (is_leaf) {
-            uint index = floatBitsToUint(record.row3.x);
-            vec3 corner0 = record.row0.xyz;
-            vec3 corner1 = record.row1.xyz;
-            vec3 corner2 = record.row2.xyz;
-            bool tests = index != ignored.triangle;
+            BvhTriangle triangle = bvh_triangle_from(record.t0, record.t1, record.t2, record.t3);
+            vec3 corner0 = triangle.p0;
+            vec3 corner1 = triangle.p1;
+            vec3 corner2 = triangle.p2;
+            bool tests = triangle.index != ignored.triangle;
             if (INSTANCED) {
                 if (instance != NO_INSTANCE) {
                     // Loaded again for each triangle: otherwise they would take twelve registers.
@@ -328,32 +328,31 @@ Hit trace_hierarchy(Ray ray, Progress progress, float limit, PlacedTriangle igno
                     corner1 = placed(rows, corner1);
                     corner2 = placed(rows, corner2);
                 }
-                tests = floatBitsToUint(record.row3.z) == 0u && (tests || instance != ignored.instance);
+                tests = triangle.kind == 0u && (tests || instance != ignored.instance);
             }
-            PlacedTriangle at = PlacedTriangle(index, instance);
+            PlacedTriangle at = PlacedTriangle(triangle.index, instance);
             over = tests && intersect_triangle(ray, local, corner0, corner1, corner2, at, progress, hit) && any_hit;
-            pop = floatBitsToUint(record.row3.y) == 1u;
+            pop = triangle.last == 1u;
             reference += 1u;
             if (INSTANCED) {
-                uint kind = floatBitsToUint(record.row3.z);
-                if (kind == PLACEMENT_RECORD) {
-                    instance = index;
-                } else if (kind == RAY_RECORD) {
-                    local = in_instance(ray, mat3x4(record.row0, record.row1, record.row2), record.row3.w);
-                    reference = index;
+                BvhInstance entered = bvh_instance_from(record.t0, record.t1, record.t2, record.t3);
+                if (entered.kind == PLACEMENT_RECORD) {
+                    instance = entered.index;
+                } else if (entered.kind == RAY_RECORD) {
+                    local = in_instance(ray, entered.rows, entered.widening);
+                    reference = entered.index;
                     outside = depth;
                 }
             }
         } else {
             // Rounding changes the order of coincident faces.
             float reached = COINCIDENT_FACES ? hit.t * (1.0 + TIE) : hit.t;
-            float enter_left = enter_box(record.row0.xyz, record.row1.xyz, local, reached);
-            float enter_right = enter_box(record.row2.xyz, record.row3.xyz, local, reached);
-            uint left = floatBitsToUint(record.row0.w);
-            uint right = floatBitsToUint(record.row2.w);
+            BvhNode node = bvh_node_from(record.t0, record.t1, record.t2, record.t3);
+            float enter_left = enter_box(node.left_low, node.left_high, local, reached);
+            float enter_right = enter_box(node.right_low, node.right_high, local, reached);
             bool left_first = enter_left <= enter_right;
-            reference = left_first ? left : right;
-            far_child = left_first ? right : left;
+            reference = left_first ? node.left : node.right;
+            far_child = left_first ? node.right : node.left;
             push = max(enter_left, enter_right) < 1e30;
             pop = min(enter_left, enter_right) >= 1e30;
         }

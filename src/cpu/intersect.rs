@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DAffine3, DVec3};
 
 use super::Inputs;
-use super::vector::{word, xyz};
+use super::vector::xyz;
 use crate::config::Accel;
 use crate::layout::{BvhRecord, LEAF, PLACEMENT_RECORD};
 use crate::packing::PackedScene;
@@ -185,9 +185,9 @@ impl<'a> Search<'a> {
             }
             if reference & LEAF != 0 {
                 let first = (reference & !LEAF) as usize;
-                if records[first].row3[2].to_bits() == PLACEMENT_RECORD {
+                if records[first].instance().kind == PLACEMENT_RECORD {
                     let entered = Entered::new(self.scene, &records[first], &records[first + 1]);
-                    self.traverse(records, records[first + 1].row3[0].to_bits(), Some(entered));
+                    self.traverse(records, records[first + 1].instance().index, Some(entered));
                 } else {
                     self.test(leaf(records, reference), instance.map(|entered| entered.index));
                 }
@@ -222,11 +222,11 @@ struct Entered {
 impl Entered {
     /// From the instance's two records.
     fn new(scene: &PackedScene, to_render: &BvhRecord, ray: &BvhRecord) -> Self {
-        let index = to_render.row3[0].to_bits();
+        let index = to_render.instance().index;
         Self {
             index,
             to_local: placement(scene, index).map().inverse(),
-            widening: ray.row3[3].into(),
+            widening: ray.instance().widening.into(),
         }
     }
 }
@@ -234,21 +234,26 @@ impl Entered {
 /// The triangles of a leaf.
 fn leaf(records: &[BvhRecord], reference: u32) -> Range<u32> {
     let triangles = &records[(reference & !LEAF) as usize..];
-    let first = triangles[0].row3[0].to_bits();
-    let others = triangles.iter().position(|triangle| triangle.row3[1].to_bits() == 1);
+    let first = triangles[0].triangle().index;
+    let others = triangles.iter().position(|record| record.triangle().last == 1);
     first..first + 1 + others.unwrap_or(0) as u32
 }
 
 /// References to the children of a node whose boxes the ray enters before `limit`, with t at the entry. The origin is shifted for
 /// the boxes' lower and upper corners.
-fn children(node: &BvhRecord, [low, high]: [DVec3; 2], inverse: DVec3, limit: f64) -> [Option<(u32, f64)>; 2] {
-    [(node.row0, node.row1), (node.row2, node.row3)].map(|(min, max)| {
+fn children(record: &BvhRecord, [low, high]: [DVec3; 2], inverse: DVec3, limit: f64) -> [Option<(u32, f64)>; 2] {
+    let node = record.node();
+    let boxes = [
+        (node.left, node.left_low, node.left_high),
+        (node.right, node.right_low, node.right_high),
+    ];
+    boxes.map(|(child, min, max)| {
         let (t0, t1) = ((xyz(min) - low) * inverse, (xyz(max) - high) * inverse);
         let enter = t0.min(t1).max_element().max(0.0);
         // The factors cover the rounding of the slab test (Ize, «Robust BVH Ray Traversal», JCGT 2(2), 2013) and of coincident
         // faces.
         let leave = t0.max(t1).min_element().min(limit * (1.0 + TIE)) * (1.0 + 4.0 * f64::EPSILON);
-        (enter <= leave).then_some((word(min), enter))
+        (enter <= leave).then_some((child, enter))
     })
 }
 

@@ -7,21 +7,76 @@ use super::constants::*;
 use super::shape::{FieldLayout, Layout, Shared};
 
 device_structs! {
-    /// A record of the BVH: an inner node with the boxes of both children, or a triangle of a leaf, or one of the two of an
-    /// instance. Records refer to each other by index; a reference with [`LEAF`] set is to the first record of a leaf, whose
-    /// others follow it. An instance is a leaf of its own.
+    /// A record of the BVH: a [`BvhNode`], a [`BvhTriangle`], or one of the two [`BvhInstance`]s of an instance. Records refer to
+    /// each other by index. A reference with [`LEAF`] set is to the first record of a leaf, whose others follow it; an instance is
+    /// a leaf of its own.
     pub struct BvhRecord: 64 {
-        /// Node: corner of the left box; w: u32 bits, the left reference. Triangle: its first corner. Instance: first row of
-        /// the map to render space, or back.
-        pub row0: [f32; 4],
-        /// Node: the left box's other corner. Triangle: its second corner. Instance: second row.
-        pub row1: [f32; 4],
-        /// Node: corner of the right box; w: u32 bits, the right reference. Triangle: its third corner. Instance: third row.
-        pub row2: [f32; 4],
-        /// Node: the right box's other corner. Leaf: u32 bits: x: index of the triangle or instance, or root of the instance's
-        /// hierarchy; y: 1 for a leaf's last; z: 0, [`PLACEMENT_RECORD`] or [`RAY_RECORD`]. f32: w: of the latter, what the
-        /// hierarchy's boxes are widened by.
-        pub row3: [f32; 4],
+        /// Bits of whichever it is.
+        pub t0: [u32; 4],
+        /// More bits.
+        pub t1: [u32; 4],
+        /// More bits.
+        pub t2: [u32; 4],
+        /// More bits.
+        pub t3: [u32; 4],
+    }
+
+    /// An inner node with the boxes of both children.
+    pub struct BvhNode: 64 {
+        /// Lower corner of the left box.
+        pub left_low: [f32; 3],
+        /// Reference to the left child.
+        pub left: u32,
+        /// Upper corner.
+        pub left_high: [f32; 3],
+        /// Zero.
+        pub padding0: u32,
+        /// Lower corner of the right box.
+        pub right_low: [f32; 3],
+        /// Reference to the right child.
+        pub right: u32,
+        /// Upper corner.
+        pub right_high: [f32; 3],
+        /// Zero.
+        pub padding1: u32,
+    }
+
+    /// A triangle of a leaf.
+    pub struct BvhTriangle: 64 {
+        /// First corner.
+        pub p0: [f32; 3],
+        /// Zero.
+        pub padding0: u32,
+        /// Second corner.
+        pub p1: [f32; 3],
+        /// Zero.
+        pub padding1: u32,
+        /// Third corner.
+        pub p2: [f32; 3],
+        /// Zero.
+        pub padding2: u32,
+        /// Index of the triangle.
+        pub index: u32,
+        /// 1 for a leaf's last triangle, else 0.
+        pub last: u32,
+        /// Zero: see [`BvhInstance::kind`].
+        pub kind: u32,
+        /// Zero.
+        pub padding3: u32,
+    }
+
+    /// An instance: a record of its placement, then a record for rays that enter it.
+    pub struct BvhInstance: 64 {
+        /// Rows of the map to render space, or of its inverse.
+        pub rows: [[f32; 4]; 3],
+        /// Index of the instance, or root of its hierarchy.
+        pub index: u32,
+        /// Zero: see [`BvhTriangle::last`].
+        pub last: u32,
+        /// [`PLACEMENT_RECORD`] or [`RAY_RECORD`].
+        pub kind: u32,
+        /// Of the latter: widening of the hierarchy's boxes.
+        pub widening: f32,
     }
 
     /// Where shared triangles are put.
@@ -206,4 +261,27 @@ device_structs! {
         /// Cubes of the objects before.
         pub first_cell: u32,
     }
+}
+
+/// Conversions between [`BvhRecord`] and what it holds.
+macro_rules! bvh_records {
+    ($($struct:ident $get:ident,)*) => {
+        $(impl From<$struct> for BvhRecord {
+            fn from(record: $struct) -> Self {
+                bytemuck::cast(record)
+            }
+        })*
+        impl BvhRecord {
+            $(/// As this struct; which one it is tells the reference to it.
+            pub fn $get(self) -> $struct {
+                bytemuck::cast(self)
+            })*
+        }
+    };
+}
+
+bvh_records! {
+    BvhNode node,
+    BvhTriangle triangle,
+    BvhInstance instance,
 }

@@ -5,6 +5,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use bytemuck::Zeroable;
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
@@ -12,7 +13,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use rayon::prelude::*;
 
-use crate::layout::{BvhRecord, LEAF, PLACEMENT_RECORD, RAY_RECORD};
+use crate::layout::{BvhInstance, BvhNode, BvhRecord, BvhTriangle, LEAF, PLACEMENT_RECORD, RAY_RECORD};
 use crate::scene::{Placement, Scene};
 
 /// Maximum number of levels of inner nodes, of both hierarchies that a ray is in together: the entries of the traversal's stack
@@ -326,14 +327,15 @@ impl<'a> Packing<'a> {
                 self.push_instance(item as usize - self.items.triangles.len());
                 continue;
             };
-            let [row0, row1, row2] = corners.map(|corner| [corner.x, corner.y, corner.z, 0.0]);
-            let last = u32::from(number + 1 == items.len());
-            self.bvh.records.push(BvhRecord {
-                row0,
-                row1,
-                row2,
-                row3: [f32::from_bits(self.next), f32::from_bits(last), 0.0, 0.0],
-            });
+            let [p0, p1, p2] = corners.map(|corner| corner.to_array());
+            self.bvh.records.push(BvhRecord::from(BvhTriangle {
+                p0,
+                p1,
+                p2,
+                index: self.next,
+                last: u32::from(number + 1 == items.len()),
+                ..BvhTriangle::zeroed()
+            }));
             if let Some(place) = self.bvh.order.get_mut(self.next as usize) {
                 *place = *index;
             } else {
@@ -350,31 +352,33 @@ impl<'a> Packing<'a> {
             (instance.placement.rows, index as u32, PLACEMENT_RECORD, 0.0),
             (inverse, instance.root, RAY_RECORD, widening),
         ];
-        for ([row0, row1, row2], number, kind, widening) in records {
-            self.bvh.records.push(BvhRecord {
-                row0,
-                row1,
-                row2,
-                row3: [f32::from_bits(number), 0.0, f32::from_bits(kind), widening],
-            });
+        for (rows, index, kind, widening) in records {
+            self.bvh.records.push(BvhRecord::from(BvhInstance {
+                rows,
+                index,
+                last: 0,
+                kind,
+                widening,
+            }));
         }
     }
 
     fn refer(&mut self, node: usize, right: bool, reference: u32) {
-        let node = &mut self.bvh.records[node];
-        let row = if right { &mut node.row2 } else { &mut node.row0 };
-        row[3] = f32::from_bits(reference);
+        let record = &mut self.bvh.records[node];
+        let mut node = record.node();
+        *if right { &mut node.right } else { &mut node.left } = reference;
+        *record = node.into();
     }
 }
 
 fn node(left: &Aabb, right: &Aabb) -> BvhRecord {
-    let row = |corner: Vec3A| [corner.x, corner.y, corner.z, 0.0];
-    BvhRecord {
-        row0: row(left.min),
-        row1: row(left.max),
-        row2: row(right.min),
-        row3: row(right.max),
-    }
+    BvhRecord::from(BvhNode {
+        left_low: left.min.into(),
+        left_high: left.max.into(),
+        right_low: right.min.into(),
+        right_high: right.max.into(),
+        ..BvhNode::zeroed()
+    })
 }
 
 /// Items below each node of a tree.

@@ -171,7 +171,6 @@ impl Face {
         } else {
             COINCIDENT | BACKED | DOUBLED
         };
-        let xyz = |[x, y, z, _]: [f32; 4]| Vec3::new(x, y, z);
         // The boxes of render space do not include the uncertainty of instances.
         let uncertain = Vec3::splat(scene.places.iter().map(|place| place.reach).fold(0.0, f32::max));
         let mut stack = vec![(0, None)];
@@ -181,23 +180,28 @@ impl Face {
             };
             let first = (reference & !LEAF) as usize;
             if reference & LEAF == 0 {
-                let node = &scene.records[first];
-                for (low, high) in [(node.row0, node.row1), (node.row2, node.row3)] {
-                    let (corner, opposite) = (xyz(low), xyz(high));
+                let node = scene.records[first].node();
+                let children = [
+                    (node.left, node.left_low, node.left_high),
+                    (node.right, node.right_low, node.right_high),
+                ];
+                for (child, low, high) in children {
+                    let (corner, opposite) = (Vec3::from(low), Vec3::from(high));
                     let (corner, opposite) = place
                         .map_or((corner - uncertain, opposite + uncertain), |place: &Place| {
                             place.place_box(corner, opposite)
                         });
                     if self.overlaps_box(corner, opposite) {
-                        stack.push((low[3].to_bits(), place));
+                        stack.push((child, place));
                     }
                 }
                 continue;
             }
             for (index, record) in (first..).zip(&scene.records[first..]) {
-                let number = record.row3[0].to_bits() as usize;
-                if record.row3[2].to_bits() == PLACEMENT_RECORD {
-                    let root = scene.records[index + 1].row3[0].to_bits();
+                let triangle = record.triangle();
+                let number = triangle.index as usize;
+                if triangle.kind == PLACEMENT_RECORD {
+                    let root = scene.records[index + 1].instance().index;
                     stack.push((root, Some(&scene.places[number])));
                     break;
                 }
@@ -205,7 +209,7 @@ impl Face {
                 found |= match place {
                     None => self.flags_beside(&scene.faces[number], scene, [material, other_material]),
                     Some(place) => {
-                        let corners = [record.row0, record.row1, record.row2].map(xyz);
+                        let corners = [triangle.p0, triangle.p1, triangle.p2].map(Vec3::from);
                         if self.is_near(corners.map(|corner| place.placement.point(corner)), place.reach) {
                             let other = Self::of_corners(corners, 0, Some(place));
                             self.flags_beside(&other, scene, [material, other_material])
@@ -217,7 +221,7 @@ impl Face {
                 if found == all {
                     return found;
                 }
-                if record.row3[1].to_bits() == 1 {
+                if triangle.last == 1 {
                     break;
                 }
             }
