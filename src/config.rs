@@ -14,7 +14,7 @@ use ranges::Checked;
 
 use crate::error::{Error, Result, Setting};
 pub use crate::layout::SEQUENCES;
-use crate::layout::{ASKS_EVERY, CONGRUENTIAL, COVERAGE_WHOLE, INDEPENDENT, SOBOL};
+use crate::layout::{BEHIND_GLASS_EVERY, CONGRUENTIAL, COVERAGE_WHOLE, INDEPENDENT, SOBOL};
 
 choices! {
     /// Which visible points an iteration uses.
@@ -249,8 +249,8 @@ impl RenderConfig {
 
     /// Whether shadow rays that end on glass continue in an iteration to estimate the light behind it: in the first iterations,
     /// then rarely, because it takes more rays. Points that have photons do so only in the very first one of them.
-    pub fn asks_behind_glass(&self, iteration: u32) -> bool {
-        iteration < 8 || iteration.is_multiple_of(ASKS_EVERY)
+    pub fn samples_behind_glass(&self, iteration: u32) -> bool {
+        iteration < 8 || iteration.is_multiple_of(BEHIND_GLASS_EVERY)
     }
 
     /// Number of photon paths of the block before `iteration` that belong to its sequence.

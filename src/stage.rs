@@ -331,11 +331,11 @@ impl StageDesc {
 
     /// The module with ray queries, if that is the one to run.
     pub fn ray_query(&self) -> Option<&'static [u8]> {
-        let asked = self
+        let enabled = self
             .constants
             .iter()
             .any(|&(name, value)| name == RAY_QUERY && value != 0);
-        self.shader.ray_query.filter(|_| asked)
+        self.shader.ray_query.filter(|_| enabled)
     }
 
     /// With these push constants, the shader's.

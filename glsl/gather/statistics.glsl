@@ -24,7 +24,7 @@ float unbent_of(DirectSum sum) {
 
 // The covered share of the disc; 1 if it has not been tested.
 float share_of(Coverage coverage) {
-    return coverage.covered > 0u ? float(coverage.covered) / float(coverage.asked) : 1.0;
+    return coverage.covered > 0u ? float(coverage.covered) / float(coverage.samples) : 1.0;
 }
 
 // log2 of a radius, offset, in units of 1/256: sums of integers do not depend on their order.

@@ -122,18 +122,18 @@ void main() {
         loop_count += 1u;
         uint slot = pixel_slot * SLOTS + used;
         // All rays of a path are traced here: each call would compile the traversal again.
-        bool asks = contributes(light_ray);
-        vec3 origin = asks ? light_ray.origin : branch.origin;
-        vec3 direction = asks ? light_ray.direction : branch.direction;
-        PlacedTriangle ignored = PlacedTriangle(asks ? MISS : branch.ignored.triangle, branch.ignored.instance);
-        Hit hit = trace_visible(origin, direction, progress, asks ? light_ray.end : 1e30, ignored, asks, random);
+        bool is_light_ray = contributes(light_ray);
+        vec3 origin = is_light_ray ? light_ray.origin : branch.origin;
+        vec3 direction = is_light_ray ? light_ray.direction : branch.direction;
+        PlacedTriangle ignored = PlacedTriangle(is_light_ray ? MISS : branch.ignored.triangle, branch.ignored.instance);
+        Hit hit = trace_visible(origin, direction, progress, is_light_ray ? light_ray.end : 1e30, ignored, is_light_ray, random);
         bool missed = hit.triangle == MISS;
         vec3 from_light = missed ? light_ray.contribution : vec3(0.0);
         light_ray = NO_LIGHT_RAY;
         if (loops_cut) {
             cut = true;
             ended = true;
-        } else if (asks) {
+        } else if (is_light_ray) {
             branch.emitted += from_light;
         } else {
             bool culls = branch.depth == 0u;

@@ -149,7 +149,7 @@ void main() {
     // Without photons nothing needs a correction.
     bool has_photons = (accepted_by(receiver) | GATHERED(GatheredOf, receiver).count) != 0u;
     Coverage before = coverage[receiver];
-    bool trusted = before.covered == before.asked && before.asked >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
+    bool trusted = before.covered == before.samples && before.samples >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
     Random random = random_of_disc(slot, push.iteration, push.points, settings.seed);
     if (!has_photons && receiver < slots() && before.surrounded == 0u && !has_caustic_photons(slot)) {
         Random behind = random;
@@ -171,5 +171,5 @@ void main() {
         covered = push.points;
     }
     coverage[receiver].covered = before.covered + covered * (COVERAGE_WHOLE / push.points);
-    coverage[receiver].asked = before.asked + COVERAGE_WHOLE;
+    coverage[receiver].samples = before.samples + COVERAGE_WHOLE;
 }

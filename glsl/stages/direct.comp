@@ -20,7 +20,7 @@ layout(local_size_x = 64) in;
 #include "common/status.glsl"
 
 layout(constant_id = 3) const bool SAMPLE_LIGHTS = true;
-layout(constant_id = 24) const bool ASKS_BEHIND_GLASS = true; // in this iteration, see RenderConfig::asks_behind_glass
+layout(constant_id = 24) const bool BEHIND_GLASS = true; // in this iteration, see RenderConfig::samples_behind_glass
 
 layout(push_constant) uniform CameraTurnPush {
     uint iteration;
@@ -36,14 +36,14 @@ layout(std430) buffer CoverageOf { Coverage coverage[]; };
 layout(std430) buffer SequenceSums { vec4 sequence_sums[]; }; // of the iteration's sequence
 
 // Whether a shadow ray that ends on glass continues.
-bool asks_behind_glass(uint slot) {
-    bool asks = false;
-    if (ASKS_BEHIND_GLASS) {
+bool samples_behind_glass(uint slot) {
+    bool through_glass = false;
+    if (BEHIND_GLASS) {
         Statistics statistics = STATISTICS(StatisticsOf, (settings.photon_maps - 1u) * slots() + slot);
         bool has_few = photons_of(statistics.accepted_low, statistics.accepted_high) < SEASONED;
-        asks = (push.iteration % ASKS_EVERY == 0u || has_few);
+        through_glass = (push.iteration % BEHIND_GLASS_EVERY == 0u || has_few);
     }
-    return asks;
+    return through_glass;
 }
 
 // Loaded at its use: otherwise it would hold registers.
@@ -60,7 +60,7 @@ VisibleBsdf bsdf_of_slot(uint slot, vec3 shading_normal) {
 // multiple importance sampling: Veach, 1997, section 9.2.4). Points of lights alone have unbounded variance next to a light. The
 // contribution is evaluated before the ray is traced, so that few values are live during the traversal. behind_glass: glass
 // occludes the light, and the result is its contribution without refraction.
-vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool asks, inout Random random,
+vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool through_glass, inout Random random,
                    out bool behind_glass) {
     behind_glass = false;
     vec4 u = next4(random);
@@ -103,7 +103,7 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
     bool goes_on = largest(brings) > 0.0;
     while (goes_on) {
         hit = trace_visible(from, ray, AT_ORIGIN, sampled.end - passed, sampled.ignored, any, random);
-        goes_on = ASKS_BEHIND_GLASS && asks && hit.triangle != MISS && !loops_cut && crossings < DIRECT_CROSSINGS;
+        goes_on = BEHIND_GLASS && through_glass && hit.triangle != MISS && !loops_cut && crossings < DIRECT_CROSSINGS;
         if (goes_on) {
             vec3 tint;
             bool ends_at_light = by_bsdf && is_light(hit);
@@ -132,10 +132,10 @@ vec3 sample_direct(VisiblePoint visible_point, uint slot, uint of_source, bool a
 }
 
 // Adds the contribution, or the one without refraction.
-void add_direct(VisiblePoint visible_point, uint slot, uint of_source, bool asks, inout Random random, inout vec3 radiance,
+void add_direct(VisiblePoint visible_point, uint slot, uint of_source, bool through_glass, inout Random random, inout vec3 radiance,
                 inout float unbent) {
     bool behind_glass;
-    vec3 sampled = sample_direct(visible_point, slot, of_source, asks, random, behind_glass);
+    vec3 sampled = sample_direct(visible_point, slot, of_source, through_glass, random, behind_glass);
     if (behind_glass) {
         unbent += finite(sampled) ? mean_of(sampled) : 0.0;
     } else {
@@ -154,18 +154,18 @@ void main() {
     coverage[slot].met += met ? 1u : 0u;
     vec3 radiance = visible_point.emitted;
     float unbent = 0.0;
-    bool asks = false;
+    bool through_glass = false;
     if (SAMPLE_LIGHTS && has_object) {
-        asks = asks_behind_glass(slot);
+        through_glass = samples_behind_glass(slot);
         CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
         Random random = random_of_pixel(LIGHT_SAMPLE, slot, turn, settings.seed);
         // Not one loop for both cases: around a single sample it costs a quarter of the stage.
         if (FEW_SOURCES) {
             for (uint source = 0u; source < settings.light_source_count; source++) {
-                add_direct(visible_point, slot, source, asks, random, radiance, unbent);
+                add_direct(visible_point, slot, source, through_glass, random, radiance, unbent);
             }
         } else {
-            add_direct(visible_point, slot, 0u, asks, random, radiance, unbent);
+            add_direct(visible_point, slot, 0u, through_glass, random, radiance, unbent);
         }
     }
     if (!finite(radiance)) {
@@ -178,7 +178,7 @@ void main() {
     add_to(sum.high.g, sum.low.g, radiance.g);
     add_to(sum.high.b, sum.low.b, radiance.b);
     sum.high.w += unbent;
-    sum.low.w += asks ? 1.0 : 0.0;
+    sum.low.w += through_glass ? 1.0 : 0.0;
     direct_sums[slot] = sum;
     sequence_sums[slot].rgb += radiance;
 }

@@ -48,7 +48,7 @@ impl CompiledKernel {
 pub fn compiled_kernels(device: Option<&str>, features: SceneFeatures) -> Result<CompiledKernels> {
     let mut compiler = Compiler::open(device)?;
     let run = clustered_run(compiler.summary().kind);
-    let mut constants = vec![("AIMED", 1), ("ASKS_BEHIND_GLASS", 0), ("RUN", run)];
+    let mut constants = vec![("AIMED", 1), ("BEHIND_GLASS", 0), ("RUN", run)];
     constants.extend(features.constants().map(|(name, present)| (name, u32::from(present))));
     let by_query = compiler.summary().ray_query;
     let mut compile = |shader: &'static Shader, ray_query: bool| {

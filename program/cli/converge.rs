@@ -158,7 +158,7 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
         seconds: arguments.time.as_secs_f64(),
         iterations: arguments.iterations,
         settings: settings(&base, arguments.vary),
-        stop: &interrupt::asked,
+        stop: &interrupt::requested,
     };
     let note = |what: &str| {
         say!("converge: {what}");
@@ -188,7 +188,7 @@ pub fn run(arguments: &ConvergeArguments) -> Result<Outcome> {
         Ok(())
     })?;
     all([print(&table).map(|_| ()), written])?;
-    Ok(if interrupt::asked() {
+    Ok(if interrupt::requested() {
         Outcome::Interrupted
     } else {
         Outcome::Done

@@ -99,7 +99,7 @@ pub fn survive_file_limits() -> Result<()> {
 }
 
 /// Whether the user has asked to stop.
-pub fn asked() -> bool {
+pub fn requested() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 

@@ -70,7 +70,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     };
     let bar = Bar::new(until, quiet);
     let hooks = Hooks {
-        stop: &interrupt::asked,
+        stop: &interrupt::requested,
         progress: &|progress| bar.show(progress),
         profile: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
     };
@@ -79,7 +79,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let rendered = rendered?;
     say_warnings(&rendered.warnings());
     write_outputs(arguments, &output, &rendered)?;
-    Ok(if interrupt::asked() {
+    Ok(if interrupt::requested() {
         Outcome::Interrupted
     } else {
         Outcome::Done

@@ -154,7 +154,7 @@ impl Renderer {
             config: &self.config,
         };
         let through_glass =
-            turn.path == 0 && inputs.scene.features.dielectric && inputs.config.asks_behind_glass(turn.iteration);
+            turn.path == 0 && inputs.scene.features.dielectric && inputs.config.samples_behind_glass(turn.iteration);
         let of_pixel = |(index, (pixel, path)): (usize, (&mut Pixel, &CameraPath))| {
             let mut radiance = path.emitted;
             if inputs.config.direct == Direct::Light {

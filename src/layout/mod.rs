@@ -1,5 +1,5 @@
-//! Every struct and number that host and kernels share, written once: `build/layout.rs` makes GLSL of this module, which is
-//! why it knows no other. `tests/layout.rs` compares each struct with the reflected one.
+//! Structs and constants shared by host and kernels, written once: `build/layout.rs` generates GLSL from this module, which
+//! therefore imports no other. `tests/layout.rs` compares each struct with the reflected one.
 
 /// Declares structs of the device's layout and `LAYOUTS`, which lists their fields.
 macro_rules! device_structs {

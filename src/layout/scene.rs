@@ -1,4 +1,4 @@
-//! What kernels have of a scene.
+//! Structs of a scene.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -7,11 +7,11 @@ use super::constants::*;
 use super::shape::{FieldLayout, Layout, Shared};
 
 device_structs! {
-    /// A record of the BVH: a [`BvhNode`], a [`BvhTriangle`], or one of the two [`BvhInstance`]s of an instance. Records refer to
-    /// each other by index. A reference with [`LEAF`] set is to the first record of a leaf, whose others follow it; an instance is
-    /// a leaf of its own.
+    /// A record of the BVH: a [`BvhNode`], a [`BvhTriangle`], or one of the two [`BvhInstance`]s of an instance. References are
+    /// indices of records. With [`LEAF`] set, a reference is to the first record of a leaf, whose other records follow it. An
+    /// instance is a separate leaf.
     pub struct BvhRecord: 64 {
-        /// Bits of whichever it is.
+        /// Bits of one of these structs.
         pub t0: [u32; 4],
         /// More bits.
         pub t1: [u32; 4],
@@ -65,7 +65,7 @@ device_structs! {
         pub padding3: u32,
     }
 
-    /// An instance: a record of its placement, then a record for rays that enter it.
+    /// An instance in the BVH: a record of its transform, then a record of the transform of rays.
     pub struct BvhInstance: 64 {
         /// Rows of the map to render space, or of its inverse.
         pub rows: [[f32; 4]; 3],
@@ -79,7 +79,7 @@ device_structs! {
         pub widening: f32,
     }
 
-    /// Where shared triangles are put.
+    /// A placement of shared triangles.
     pub struct Instance: 64 {
         /// Rows of the map to render space.
         pub rows: [[f32; 4]; 3],
@@ -89,7 +89,7 @@ device_structs! {
         pub flags: u32,
         /// Index of its first triangle.
         pub first_triangle: u32,
-        /// How many it has.
+        /// Number of triangles.
         pub triangle_count: u32,
     }
 
@@ -103,32 +103,32 @@ device_structs! {
         pub n2: [f32; 4],
     }
 
-    /// A triangle as shading needs it.
+    /// A triangle for shading.
     pub struct ShadingTriangle: 64 {
         /// Position of the first corner.
         pub p0: [f32; 3],
-        /// Octahedral shading normal there.
+        /// Octahedral shading normal at the first corner.
         pub n0: u32,
-        /// Of the second corner.
+        /// Position of the second corner.
         pub p1: [f32; 3],
-        /// Of the second corner.
+        /// Octahedral shading normal at the second corner.
         pub n1: u32,
-        /// Of the third corner.
+        /// Position of the third corner.
         pub p2: [f32; 3],
-        /// Of the third corner.
+        /// Octahedral shading normal at the third corner.
         pub n2: u32,
-        /// Index of its object; what instances share has none.
+        /// Index of its object; unused for shared triangles.
         pub object: u32,
         /// Index of its material.
         pub material: u32,
-        /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED_TRIANGLE`], [`SEE_THROUGH`], [`COINCIDENT`], [`BACKED`], and the rank from bit
-        /// [`RANK`] on; what instances share has none.
+        /// [`SMOOTH_SHADED`], [`TOUCHED`], [`TEXTURED_TRIANGLE`], [`SEE_THROUGH`], [`COINCIDENT`], [`BACKED`], and the rank from
+        /// bit [`RANK`] on, which is unused for shared triangles.
         pub flags: u32,
-        /// Index of its light, the first of those of its parts, or [`NO_LIGHT`].
+        /// Index of its first light, one for each part, or [`NO_LIGHT`].
         pub light: u32,
     }
 
-    /// What the corner of a triangle has for textures.
+    /// Texture coordinates, colour and tangent of a triangle's corner.
     pub struct Corner: 32 {
         /// Coordinates of the first set.
         pub first: [f32; 2],
@@ -138,21 +138,21 @@ device_structs! {
         pub color: [u32; 2],
         /// Octahedral tangent.
         pub tangent: u32,
-        /// 1 or −1 for the bitangent's side, 0 where there is no tangent.
+        /// Sign of the bitangent: 1 or −1, 0 without a tangent.
         pub bitangent: f32,
     }
 
-    /// How a texture is looked up. A place is row · (u, v, 1), in widths and heights of the image.
+    /// A texture lookup. Coordinates row · (u, v, 1) are in widths and heights of the image.
     pub struct TextureLookup: 48 {
-        /// To the place along the image's width.
+        /// Row of the coordinate along the image's width.
         pub row_u: [f32; 3],
-        /// Index of the image's first texel, which is the top left one: RGBA, a byte each.
+        /// Index of the image's first texel (top left): RGBA, a byte each.
         pub first_texel: u32,
-        /// To the place along the image's height.
+        /// Row of the coordinate along the image's height.
         pub row_v: [f32; 3],
         /// Width, and height in the upper half.
         pub size: u32,
-        /// [`SECOND_SET`], [`SRGB`], [`NEAREST`], and the wraps at [`WRAP_U`] and [`WRAP_V`].
+        /// [`SECOND_SET`], [`SRGB`], [`NEAREST`], and the wrap modes at [`WRAP_U`] and [`WRAP_V`].
         pub flags: u32,
         /// Zero.
         pub padding0: u32,
@@ -162,62 +162,62 @@ device_structs! {
         pub padding2: u32,
     }
 
-    /// A light, and a cell of the alias table that chooses one. What its kind doesn't use is zero.
+    /// A light, and a cell of the alias table that chooses one. Fields that its kind does not use are zero.
     pub struct Light: 80 {
         /// Triangle: its index.
         pub triangle: u32,
         /// Its probability, nearly in proportion to its flux.
         pub probability: f32,
-        /// Area of the triangle, or of its part, or of the disc that a distant light's photons start from.
+        /// Area of the triangle or its part, or of the disc from which a distant light's photons start.
         pub area: f32,
         /// [`TRIANGLE_LIGHT`], [`POINT_LIGHT`], [`SPOT_LIGHT`], [`DIRECTIONAL_LIGHT`] or [`ENVIRONMENT_LIGHT`].
         pub kind: u32,
-        /// Of the cell: the part of it that chooses this light.
+        /// Alias table: the fraction of the cell that chooses this light.
         pub accept: f32,
-        /// Of the cell: the light that the rest of it chooses.
+        /// Alias table: the light that the rest of the cell chooses.
         pub alias: u32,
-        /// Probability of this light and those before it among the lights of its source ([`EmissionCell`]), a multiple of 2⁻²⁴.
+        /// Cumulative probability of this light among the lights of its source ([`EmissionCell`]), a multiple of 2⁻²⁴.
         pub cumulative: f32,
-        /// Point, spot: radius of a disc that looks at whom it lights, render units. Directional: 1 − cos of the angle between the
-        /// middle and the edge of what is seen of it. 0: none.
+        /// Point, spot: radius of a disc that faces the illuminated point, render units. Directional: 1 − cos of the angle
+        /// between the centre and the edge of the visible disc. 0: no extent.
         pub extent: f32,
         /// Point, spot: radiant intensity along the axis. Directional: irradiance across the rays. Linear RGB.
         pub intensity: [f32; 3],
-        /// Spot: 1 − cos of the angle where it begins to fall off.
+        /// Spot: 1 − cos of the angle where the falloff begins.
         pub inner: f32,
-        /// Point, spot: where it is. Directional: centre of the disc. Triangle: which of its parts, each a light of its own, this one is:
-        /// column and row, and how many columns there are; all of it is 0, 0, 1. They follow each other row by row.
+        /// Point, spot: position. Directional: centre of the disc. Triangle: the part, which is a separate light: column, row,
+        /// and number of columns; 0, 0, 1 for the whole triangle. Parts are stored row by row.
         pub position: [f32; 3],
-        /// Spot: 1 − cos of the angle where it ends.
+        /// Spot: 1 − cos of the angle where the falloff ends.
         pub outer: f32,
-        /// Spot, directional: unit vector that it shines along.
+        /// Spot, directional: unit vector of the direction of emission.
         pub direction: [f32; 3],
-        /// Point, spot: 1 over the distance that it reaches, 0 where it reaches any.
+        /// Point, spot: 1 over the range; 0 without a range.
         pub inverse_range: f32,
     }
 
-    /// What a source of light can bring at the most: its lights' bounds in place and direction.
+    /// Bounds of a light source in position and direction, which bound its contribution to a point.
     pub struct LightSource: 64 {
-        /// Triangles, points: centre of a sphere around them.
+        /// Triangles, points: centre of a bounding sphere.
         pub centre: [f32; 3],
         /// Its radius.
         pub radius: f32,
-        /// Unit vector that they shine along; 0 where that is to all sides.
+        /// Unit vector of the main direction of emission; 0 if it emits in all directions.
         pub axis: [f32; 3],
-        /// Cosine of the angle that a triangle's normal or a spot's edge leans from it at the most, or of half the angle that a sun is
-        /// seen at.
+        /// Cosine of the maximum angle between that axis and a triangle's normal or a spot's edge, or of the angular radius of a
+        /// sun.
         pub cos_cone: f32,
         /// Triangles, points: intensity along the normal or axis. Others: irradiance.
         pub strength: f32,
-        /// As of its lights, where all have one.
+        /// That of its lights, if all have one.
         pub inverse_range: f32,
-        /// As of its lights.
+        /// Kind of its lights.
         pub kind: u32,
         /// Index of its first light.
         pub first_light: u32,
-        /// Lights.
+        /// Number of lights.
         pub light_count: u32,
-        /// Probability that it is chosen without knowing the point.
+        /// Probability of choosing it independently of the point.
         pub probability: f32,
         /// Zero.
         pub padding0: u32,
@@ -226,31 +226,31 @@ device_structs! {
     }
 
     /// A box of starts of photon paths, and a cell of the alias table that chooses one. A start has five coordinates in [0, 1):
-    /// place x and y, direction x and y, and which light of its source.
+    /// position x and y, direction x and y, and the choice of a light of its source.
     pub struct EmissionCell: 64 {
-        /// Lower corner of the box, but for the last coordinate.
+        /// Lower corner of the box, without the last coordinate.
         pub low: [f32; 4],
-        /// Its sides.
+        /// Size of the box, without the last coordinate.
         pub size: [f32; 4],
         /// Lower end of the last coordinate.
         pub low_light: f32,
-        /// That side.
+        /// Size along the last coordinate.
         pub size_light: f32,
         /// The box's volume over its probability.
         pub weight: f32,
-        /// Of the table's cell: the part of it that chooses this box.
+        /// Alias table: the fraction of the cell that chooses this box.
         pub accept: f32,
-        /// Of the table's cell: the box that the rest of it chooses.
+        /// Alias table: the box that the rest of the cell chooses.
         pub alias: u32,
         /// First light of the source.
         pub first_light: u32,
-        /// How many it has.
+        /// Number of lights.
         pub lights: u32,
-        /// Index of the sphere that the paths meet first of all, or the number of spheres for those that meet none.
+        /// Index of the target sphere that the paths hit first, or the number of spheres for paths that hit none.
         pub target: u32,
     }
 
-    /// A grid of cubes for an object. The scene's.
+    /// An object's grid of cubes.
     pub struct ObjectGrid: 32 {
         /// Corner of the object's bounding box, render units.
         pub low: [f32; 3],
@@ -258,12 +258,12 @@ device_structs! {
         pub inverse_cell: f32,
         /// Cubes along each axis.
         pub cells: [u32; 3],
-        /// Cubes of the objects before.
+        /// Number of cubes of all previous objects.
         pub first_cell: u32,
     }
 }
 
-/// Conversions between [`BvhRecord`] and what it holds.
+/// Conversions between [`BvhRecord`] and the structs that it contains.
 macro_rules! bvh_records {
     ($($struct:ident $get:ident,)*) => {
         $(impl From<$struct> for BvhRecord {
@@ -272,7 +272,7 @@ macro_rules! bvh_records {
             }
         })*
         impl BvhRecord {
-            $(/// As this struct; which one it is tells the reference to it.
+            $(/// As this struct, if the reference is to one.
             pub fn $get(self) -> $struct {
                 bytemuck::cast(self)
             })*

@@ -1,6 +1,6 @@
-//! How structs and their fields are laid out, and what types fields can have, as kernels see them.
+//! Memory layout of structs and types of fields, in GLSL.
 
-/// What a number is.
+/// Scalar types.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scalar {
     /// `uint`.
@@ -9,10 +9,10 @@ pub enum Scalar {
     Float,
 }
 
-/// Numbers of one kind: one, or rows of several.
+/// A number, a vector, or rows of vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
-    /// Of each.
+    /// Type of the numbers.
     pub scalar: Scalar,
     /// Numbers in a row.
     pub columns: usize,
@@ -21,7 +21,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Bytes.
+    /// Size in bytes.
     pub const fn size(self) -> usize {
         4 * self.columns * self.rows
     }
@@ -36,9 +36,9 @@ impl Shape {
     }
 }
 
-/// A type that a field can have.
+/// A type of fields.
 pub trait Shared {
-    /// What kernels see of it.
+    /// Its shape in GLSL.
     const SHAPE: Shape;
 }
 
@@ -67,7 +67,7 @@ impl<T: Shared, const N: usize> Shared for [T; N] {
 pub struct FieldLayout {
     /// Its name.
     pub name: &'static str,
-    /// Bytes from the struct's beginning.
+    /// Offset in bytes.
     pub offset: usize,
     /// Its type.
     pub shape: Shape,
@@ -78,8 +78,8 @@ pub struct FieldLayout {
 pub struct Layout {
     /// Its name.
     pub name: &'static str,
-    /// Bytes.
+    /// Size in bytes.
     pub size: usize,
-    /// In order.
+    /// In the order of their offsets.
     pub fields: &'static [FieldLayout],
 }

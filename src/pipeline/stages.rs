@@ -85,8 +85,8 @@ impl Stages<'_> {
     /// The stages after an iteration's photons; `photons` is the number of paths.
     pub(super) fn end(&self, turn: CameraTurn, photons: u32, recording: &mut Recording) {
         let iteration = turn.iteration;
-        let asks = self.features.dielectric && self.config.asks_behind_glass(iteration);
-        self.direct(turn, asks, recording);
+        let through_glass = self.features.dielectric && self.config.samples_behind_glass(iteration);
+        self.direct(turn, through_glass, recording);
         // The paper has no such correction.
         if self.config.estimator == Estimator::Sppm {
             recording.dispatch(self.ray_stage(&shaders::COVERAGE, self.sizes.receivers()).push(
@@ -156,11 +156,11 @@ impl Stages<'_> {
         );
     }
 
-    /// Direct light at the visible points. `asks`: whether light behind glass is estimated.
-    fn direct(&self, turn: CameraTurn, asks: bool, recording: &mut Recording) {
+    /// Direct light at the visible points. `through_glass`: whether light behind glass is estimated.
+    fn direct(&self, turn: CameraTurn, through_glass: bool, recording: &mut Recording) {
         recording.dispatch(
             self.ray_stage(&shaders::DIRECT, self.sizes.slots())
-                .constant("ASKS_BEHIND_GLASS", u32::from(asks))
+                .constant("BEHIND_GLASS", u32::from(through_glass))
                 .push(shaders::CameraTurnPush::from(turn))
                 .bind(vec![sums_of(turn.iteration)]),
         );

@@ -78,16 +78,16 @@ impl Work<'_> {
     /// Any failure before the first picture. Later failures are returned with the picture of the iterations before.
     pub fn run(&self, backend: &mut dyn Backend) -> Result<Done> {
         let start = Instant::now();
-        let asked = self.hooks.stop;
+        let stopped = self.hooks.stop;
         let done = |backend: &dyn Backend, error| self.until.done(backend.iterations(), start.elapsed(), error);
-        let stop = || asked() || self.until.time.is_some_and(|time| start.elapsed() >= time);
+        let stop = || stopped() || self.until.time.is_some_and(|time| start.elapsed() >= time);
         let mut profile = Profile::default();
         let mut kept: Option<Kept> = None;
         let mut error = None;
         let mut failure = None;
         let mut has_begun = false;
         // There is always a picture, however short the time; iterations that were submitted ahead are completed.
-        while backend.iterations() == 0 || has_begun || !(asked() || done(backend, error) >= 1.0) {
+        while backend.iterations() == 0 || has_begun || !(stopped() || done(backend, error) >= 1.0) {
             let began = start.elapsed();
             let next = backend.iterations() + 1;
             let is_due = ErrorEstimate::is_due(next);

@@ -72,11 +72,11 @@ fn coverage_of_the_device_is_that_of_the_cpu() {
             let random = Random::of_disc(&bench.config, slot as u32, 0, COVERAGE_WHOLE);
             let has_photons = statistics[receiver].accepted() > 0;
             assert_eq!(
-                found.asked,
+                found.samples,
                 if has_photons { COVERAGE_WHOLE } else { 0 },
                 "{name}, {receiver}"
             );
-            let covered = (0..found.asked).filter(|&number| {
+            let covered = (0..found.samples).filter(|&number| {
                 let [u, v, ..] = random.sample_of(number, COVERAGE_WHOLE).next4();
                 cpu::can_have_photons(&inputs, place, f64::from(radii2[receiver]).sqrt(), [u, v])
             });
@@ -90,14 +90,14 @@ fn coverage_of_the_device_is_that_of_the_cpu() {
                 let [u, v, ..] = behind.next4();
                 let is_surrounded = cpu::is_surrounded(&inputs, place, [u, v]);
                 // A caustic photon shows that the point is surrounded.
-                let asks =
+                let samples_surroundings =
                     receiver + points.len() >= statistics.len() || statistics[receiver + points.len()].accepted() == 0;
-                agreement.note(!asks || (found.surrounded > 0) == is_surrounded, || {
+                agreement.note(!samples_surroundings || (found.surrounded > 0) == is_surrounded, || {
                     format!("receiver {receiver}: {found:?} on the device, surrounded on the CPU: {is_surrounded}")
                 });
             }
             surrounded += u32::from(found.surrounded > 0);
-            partly += u32::from(found.covered < found.asked);
+            partly += u32::from(found.covered < found.samples);
         }
         // For a point next to an edge, rounding decides on which side it lies.
         agreement.assert(&format!("coverage in {name}"), 0.99, 2000);

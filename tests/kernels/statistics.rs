@@ -294,7 +294,7 @@ fn cells_want_photons_as_the_visible_points_do_that_reach_them() {
         let slots = seen.points.len();
         let share = |coverage: &Coverage| match coverage.covered {
             0 => 1.0,
-            covered => f64::from(covered) / f64::from(coverage.asked),
+            covered => f64::from(covered) / f64::from(coverage.samples),
         };
         let wants = |receiver: usize| {
             let slot = receiver % slots;
@@ -399,7 +399,7 @@ fn pictures_are_resolved_by_equation_4() {
             // Some have no coverage yet.
             coverage.push(Coverage {
                 covered: (16.0 * b) as u32,
-                asked: 16,
+                samples: 16,
                 surrounded: u32::from(c < 0.5),
                 met: (12.0 * c) as u32,
             });
@@ -439,7 +439,7 @@ fn pictures_are_resolved_by_equation_4() {
             for slot in of_pixel.clone() {
                 let (direct, known) = (&direct_sums[slot], &coverage[slot]);
                 let share = if known.covered > 0 {
-                    f64::from(known.covered) / f64::from(known.asked)
+                    f64::from(known.covered) / f64::from(known.samples)
                 } else {
                     1.0
                 };
