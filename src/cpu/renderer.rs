@@ -257,8 +257,9 @@ impl Backend for Renderer {
         let mut turn = CameraTurn::that_gathers(&self.config, iteration);
         if iteration == 0 || self.config.estimator == Estimator::Sppm {
             self.paths = clock.time("camera", || self.trace_camera_paths(turn));
-            self.find_discs();
         }
+        // Equation 2 has shrunk them, also where the visible points stay.
+        self.find_discs();
         let mut gathered = vec![Gathered::default(); self.slots.len()];
         let (mut emitted, mut stored, mut ended) = (0, 0, [0; 2]);
         while emitted < self.config.photons {

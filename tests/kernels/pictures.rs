@@ -6,6 +6,8 @@ use ppm_vk::internals::config::{Direct, EmissionChoice, Estimator, RenderConfig,
 
 use super::bench::{Bench, small};
 
+/// Standard errors, see below.
+const STUDENT: f64 = 7.5;
 /// Samples of each number.
 const SAMPLES: u32 = 12;
 const SIDE: u32 = 32;
@@ -62,7 +64,6 @@ fn mean_of(samples: &[f64]) -> (f64, f64) {
 /// subtracted.
 #[test]
 fn both_renderers_converge_to_the_same_picture() {
-    const STUDENT: f64 = 7.5;
     let mut wrong = Vec::new();
     for (name, estimator, direct, max_depth) in [
         ("cornell-spheres", Estimator::Sppm, Direct::Light, 128),
@@ -146,4 +147,40 @@ fn both_renderers_converge_to_the_same_picture() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Photons that all discs together have counted. Where visible points stay, their number shows whether it is the shrunk disc that
+/// gathers. The bound is that above: it fails a right pair of programs once in 5 million runs.
+#[test]
+fn discs_that_shrink_count_as_many_photons_as_the_kernels_do() {
+    let (mut found, mut expected) = (Vec::new(), Vec::new());
+    for seed in 0..SAMPLES {
+        let config = RenderConfig {
+            estimator: Estimator::Ppm,
+            direct: Direct::Photons,
+            emission: EmissionChoice::Power,
+            resolution: [SIDE; 2],
+            photons: 2500,
+            radius: Some(0.15),
+            seed,
+            ..small()
+        };
+        let mut bench = Bench::new("cornell", config);
+        let mut plain = bench.plain();
+        let counted = |renderer: &mut dyn Backend| {
+            while renderer.iterations() < 8 {
+                renderer.iterate().expect("an iteration");
+            }
+            renderer.resolve_all().expect("a picture");
+            renderer.counters().photons_accepted as f64
+        };
+        found.push(counted(&mut bench.renderer));
+        expected.push(counted(&mut plain));
+    }
+    let ((found, variance), (expected, expected_variance)) = (mean_of(&found), mean_of(&expected));
+    let error = (variance + expected_variance).sqrt();
+    let text = format!("{found} photons counted by kernels, {expected} plainly, ± {error}");
+    println!("{text}");
+    assert!(error < 0.01 * expected, "{text}: too few to tell");
+    assert!((found - expected).abs() < STUDENT * error, "{text}");
 }
