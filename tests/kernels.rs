@@ -7,6 +7,8 @@ mod agreement;
 mod bench;
 #[path = "kernels/coverage.rs"]
 mod coverage;
+#[path = "kernels/emission.rs"]
+mod emission;
 #[path = "kernels/gather.rs"]
 mod gather;
 #[path = "kernels/instances.rs"]

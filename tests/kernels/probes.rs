@@ -22,7 +22,7 @@ use super::agreement::{Agreement, relative_difference};
 use super::bench::{Bench, random_numbers, small, xyz};
 
 /// What a probe finds for each of these.
-fn probe<A: Pod, F: Pod>(
+pub fn probe<A: Pod, F: Pod>(
     bench: &mut Bench,
     shader: &'static Shader,
     features: SceneFeatures,
