@@ -111,6 +111,34 @@ fn straight_paths_end_at_the_cpus_points_and_gather_the_same() {
     }
 }
 
+/// In mirrors too: what sets a disc's size is the whole way from the camera.
+#[test]
+fn footprints_grow_with_the_way_over_mirrors() {
+    let mut bench = Bench::new("cornell-spheres", small());
+    let seen = bench.seen();
+    let found: Vec<f32> = bench.download(BufferId::Footprints);
+    let paths = bench.plain().trace_camera_paths(last_turn(&bench.config));
+    let settings = bench.settings;
+    let [width, _] = settings.resolution.map(|side| side as usize);
+    let mut footprints = Agreement::default();
+    for (slot, point) in seen.points.iter().enumerate() {
+        let pixel = ppm_vk::internals::config::pixel_of(settings.resolution, slot as u32);
+        let [x, y] = pixel.expect("whole tiles").map(|at| at as usize);
+        let (position, Some(expected)) = (xyz(point.position), paths[y * width + x].points.first()) else {
+            continue;
+        };
+        let straight = position.distance(xyz(settings.camera_position)) * f64::from(settings.pixel_spread);
+        // The same place by a detour.
+        if position.distance(expected.surface.position) < 1e-4 && expected.footprint > 1.01 * straight {
+            let difference = relative_difference(found[slot].into(), expected.footprint);
+            footprints.note(difference < 1e-4, || {
+                format!("slot {slot}: {} instead of {}", found[slot], expected.footprint)
+            });
+        }
+    }
+    footprints.assert("footprints of what mirrors show", 1.0, 150);
+}
+
 /// The bounce limit ends the reflection. The CPU's paths end at the base at random, the kernels' always do.
 #[test]
 fn the_bounce_limit_leaves_the_base_of_narrow_surfaces() {
