@@ -364,6 +364,40 @@ fn dropping_photons_that_nobody_wants_changes_nothing_that_is_gathered() {
     }
 }
 
+/// τ belongs to a disc of R, also where a footprint has bounded the disc that was gathered from.
+#[test]
+fn flux_of_a_smaller_disc_counts_as_that_of_the_whole_one() {
+    let mut bench = Bench::new("cornell", tiny());
+    let points: Vec<VisiblePoint> = (0..64).map(|slot| visible_point([0.0; 3], slot)).collect();
+    let parts = [1.0, 0.5, 0.25, 0.1];
+    let radii2: Vec<f32> = (0..64).map(|slot| 0.01 * parts[slot % 4]).collect();
+    let arrived = Gathered {
+        flux: [1.0, 2.0, 3.0],
+        count: 4,
+        ..Gathered::zeroed()
+    };
+    bench.upload(BufferId::VisiblePoints, &points);
+    bench.upload(BufferId::Radii2, &radii2);
+    bench.upload(BufferId::StatisticsOf, &[Statistics::of_radius2(0.01); 64]);
+    bench.upload(BufferId::GatheredOf, &[arrived; 64]);
+    let mut recording = Recording::new();
+    recording.dispatch(
+        StageDesc::new(&shaders::UPDATE, 64)
+            .push([1f32])
+            .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
+    );
+    bench.renderer.run(&recording).expect("a run");
+    for (slot, found) in bench.download::<Statistics>(BufferId::StatisticsOf).iter().enumerate() {
+        let mut expected = cpu::Statistics::from(&Statistics::of_radius2(0.01));
+        let flux = DVec3::new(1.0, 2.0, 3.0) / f64::from(parts[slot % 4]);
+        expected.take(4, flux, bench.config.alpha.into());
+        let found = cpu::Statistics::from(found);
+        let same = found.flux.distance(expected.flux) < TOLERANCE * expected.flux.length()
+            && relative_difference(found.radius2, expected.radius2) < TOLERANCE;
+        assert!(same, "slot {slot}: {found:?} instead of {expected:?}");
+    }
+}
+
 #[test]
 fn updates_clear_the_gathered_sums() {
     let mut bench = Bench::new("cornell-spheres", small());
