@@ -97,6 +97,33 @@ fn a_floor_under_a_square_light_has_the_irradiance_of_its_view_factor() {
     }
 }
 
+/// So near a lamp rays go by the BSDF as well: light that both ways bring counts once.
+#[test]
+fn a_floor_close_under_a_square_light_has_the_irradiance_of_its_view_factor() {
+    const HALF_SIDE: f64 = 0.5;
+    const HEIGHT: f64 = 0.2;
+    let mut scene = Document::new("close");
+    let grey = scene.material(matte("grey", [0.5; 3]));
+    let lamp = scene.material(light("lamp", [10.0; 3]));
+    scene.object("floor", &Mesh::facing_up(0.6, 0.0), grey);
+    scene.object("lamp", &Mesh::facing_down(HALF_SIDE, HEIGHT), lamp);
+    // Through the lamp's back, which has one side.
+    scene.camera([0.9, 0.9], [0.0, 0.0], 30.0);
+    let scene = subject(scene);
+    let regions =
+        [([24, 24], 18), ([24, 24], 4), ([8, 24], 6), ([24, 40], 6)].map(|(at, side)| Region::around(at, side));
+    let irradiance = |point| 10.0 * irradiance_under_square(point, HALF_SIDE, HEIGHT);
+    assert_floor_is_lit_by(
+        &scene,
+        &config(Direct::Light, 100, 0.25),
+        0.5,
+        irradiance,
+        &regions,
+        false,
+        1.0,
+    );
+}
+
 /// One of a panel's 4,096 texels shines, or a tent over four of them where texels are blended: as a square of its size does, and with
 /// as little noise. Chosen by area alone, rays and photons would miss it 4,095 times of 4,096.
 #[test]
