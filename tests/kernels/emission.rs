@@ -2,10 +2,12 @@
 //! rounding.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec4};
 use ppm_vk::internals::config::{EmissionChoice, RenderConfig};
 use ppm_vk::internals::cpu;
+use ppm_vk::internals::layout::BACK_EMITS;
 use ppm_vk::internals::shaders;
+use ppm_vk::internals::stage::BufferId;
 
 use super::agreement::Agreement;
 use super::bench::{Bench, random_numbers, small, xyz};
@@ -42,7 +44,15 @@ fn bench_with_lights(name: &str) -> (Bench, Vec<u32>) {
         emission: EmissionChoice::Power,
         ..small()
     };
-    let bench = Bench::new(name, config);
+    let bench = Bench::with(name, config, |scene| {
+        // One scene's lamps shine to both sides.
+        if name == "many-lamps" {
+            scene
+                .materials
+                .iter_mut()
+                .for_each(|material| material.flags |= BACK_EMITS);
+        }
+    });
     let kinds = bench.scene.lights.iter().map(|light| light.kind);
     let mut numbers: Vec<(u32, u32)> = (0..).zip(kinds).map(|(number, kind)| (kind, number)).collect();
     numbers.sort_unstable();
@@ -167,6 +177,69 @@ fn aiming_at_a_sphere_leaves_the_flux_through_it_as_it_is() {
                     );
                 }
             }
+        }
+    }
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct AskedGuide {
+    position: [f32; 4],
+    normal: [f32; 4],
+    u: [f32; 4],
+}
+
+/// The moments of cosine-distributed directions, 1 and 2n/3, are those of guided ones with their weights. The bound is that above.
+#[test]
+fn guided_photons_leave_as_by_the_cosine() {
+    const COUNT: u32 = 40_000;
+    let config = RenderConfig {
+        aims_anyway: true,
+        ..small()
+    };
+    let mut bench = Bench::new("blinds", config);
+    let table: Vec<Vec4> = bench.download(BufferId::EmissionTable);
+    let [_, targets, view, _] = table[0].to_array().map(f32::to_bits);
+    assert!(view < targets, "nothing is guided in this scene");
+    let sphere = table[1 + view as usize];
+    let (centre, radius) = (sphere.truncate().as_dvec3(), f64::from(sphere.w));
+    // From just outside of where all is near, from afar, and from below the horizon in part.
+    for (way, lean) in [(2.05, 0.0), (2.05, 1.0), (2.3, 1.4), (4.0, 0.5)] {
+        let axis = DVec3::new(0.48, 0.6, 0.64);
+        let across = DVec3::new(0.8, 0.0, -0.6);
+        let normal = axis * f64::cos(lean) + across * f64::sin(lean);
+        let position = (centre - way * radius * axis).as_vec3().extend(0.0).to_array();
+        let ask = |u: [f32; 4]| AskedGuide {
+            position,
+            normal: normal.as_vec3().extend(0.0).to_array(),
+            u,
+        };
+        let asked: Vec<AskedGuide> = random_numbers(COUNT).map(ask).collect();
+        let (features, sampler) = (bench.scene.features, bench.config.sampler);
+        let found: Vec<[f32; 4]> = probe(&mut bench, &shaders::GUIDE_PROBE, features, sampler, &asked);
+        let is_hit = |found: &&[f32; 4]| {
+            let along = xyz(**found).dot(axis);
+            along > 0.0 && way * way * (1.0 - along * along) <= 1.0
+        };
+        let hits = found.iter().filter(is_hit).count();
+        assert!(
+            hits > found.len() / 3,
+            "{way} radii away: {hits} of {COUNT} go to the view"
+        );
+        for (what, factor, expected) in [
+            ("number", None, 1.0),
+            ("normal", Some(normal), 2.0 / 3.0),
+            ("axis", Some(axis), 2.0 / 3.0 * normal.dot(axis)),
+        ] {
+            let value = |found: &[f32; 4]| f64::from(found[3]) * factor.map_or(1.0, |factor| factor.dot(xyz(*found)));
+            let count = found.len() as f64;
+            let mean = found.iter().map(value).sum::<f64>() / count;
+            let squares: f64 = found.iter().map(|found| (value(found) - mean).powi(2)).sum();
+            let error = (squares / (count * (count - 1.0))).sqrt();
+            assert!(
+                (mean - expected).abs() < 6.0 * error + 1e-5,
+                "{way} radii away, leaning by {lean}, {what}: {mean} instead of {expected}, ± {error}"
+            );
         }
     }
 }
