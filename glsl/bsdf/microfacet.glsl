@@ -33,9 +33,8 @@ float joint_masking(float alpha, float nv, float nl) {
 }
 
 // A microfacet's normal that v sees: Dupuy and Benyoub, «Sampling Visible GGX Normals with Spherical Caps», Computer
-// Graphics Forum 42(8), 2023.
-vec3 visible_normal(float alpha, vec3 n, vec3 v, vec2 u) {
-    mat3 frame = basis(n);
+// Graphics Forum 42(8), 2023. `alpha`: along the frame's first two directions; its third is the surface's normal.
+vec3 visible_normal(vec2 alpha, mat3 frame, vec3 v, vec2 u) {
     vec3 local = v * frame;
     vec3 stretched = normalize(vec3(alpha * local.xy, local.z));
     float phi = 2.0 * PI * u.x;
@@ -43,6 +42,10 @@ vec3 visible_normal(float alpha, vec3 n, vec3 v, vec2 u) {
     float sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
     vec3 cap = vec3(sine * cos(phi), sine * sin(phi), z) + stretched;
     return normalize(frame * normalize(vec3(alpha * cap.xy, max(cap.z, 1e-6))));
+}
+
+vec3 visible_normal(float alpha, vec3 n, vec3 v, vec2 u) {
+    return visible_normal(vec2(alpha), basis(n), v, u);
 }
 
 vec3 reflected_direction(float alpha, vec3 n, vec3 v, vec2 u) {
