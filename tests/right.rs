@@ -6,6 +6,8 @@
 
 #[path = "right/aimed.rs"]
 mod aimed;
+#[path = "right/anisotropy.rs"]
+mod anisotropy;
 #[path = "right/camera.rs"]
 mod camera;
 #[path = "right/coat.rs"]

@@ -19,7 +19,7 @@ Material material_at(uint i) {
 
 Material no_material() {
     uvec4 zero = uvec4(0u);
-    return material_from(zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero);
+    return material_from(zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero);
 }
 
 bool is_mirror(Material material) {
@@ -68,7 +68,10 @@ Bsdf bsdf_of(Material material) {
                     mix(material.specular_f0, material.base_color, material.metallic),
                     mix(material.specular_f90, 1.0, material.metallic), material.roughness * material.roughness,
                     vec2(largest(material.specular_f0), material.specular_f90), material.coat,
-                    Sheen(material.sheen_color, material.sheen_roughness));
+                    Sheen(material.sheen_color, material.sheen_roughness), 0.0, material.anisotropy_direction);
+        if (ANISOTROPY && material.anisotropy > 0.0 && bsdf.alpha >= SMOOTH_ALPHA) {
+            bsdf.along = mix(bsdf.alpha, 1.0, material.anisotropy * material.anisotropy);
+        }
     }
     return bsdf;
 }
@@ -84,6 +87,7 @@ Material coat_of(Material material) {
     material.specular_f90 = coat;
     material.coat = 0.0;
     material.sheen_color = vec3(0.0);
+    material.anisotropy = 0.0;
     return material;
 }
 
@@ -233,10 +237,38 @@ void lean_normals(Hit hit, MaterialPoint point, inout Surface surface) {
     }
 }
 
+// Turns a material's direction of anisotropy into render space. Without a tangent the material is isotropic.
+void turn_anisotropy(Hit hit, Surface surface, inout Material material) {
+    vec2 turn = vec2(cos(material.anisotropy_rotation), sin(material.anisotropy_rotation));
+    if (material.anisotropy_texture != NO_TEXTURE) {
+        vec3 value = texture_value(material.anisotropy_texture, texture_coordinates(hit)).rgb;
+        vec2 local = 2.0 * value.rg - 1.0;
+        turn = vec2(turn.x * local.x - turn.y * local.y, turn.y * local.x + turn.x * local.y);
+        material.anisotropy *= value.b;
+    }
+    vec4 tangent = tangent_at(hit);
+    vec3 n = surface.shading_normal;
+    vec3 t = tangent.xyz - dot(tangent.xyz, n) * n;
+    float length2 = dot(t, t);
+    t *= inversesqrt(max(length2, 1e-12));
+    vec3 direction = turn.x * t + turn.y * sign(tangent.w) * cross(n, t);
+    bool has_direction = length2 >= 1e-12 && tangent.w != 0.0 && dot(turn, turn) > 1e-6;
+    if (has_direction && material.anisotropy > 0.0) {
+        material.anisotropy_direction = encode_direction(direction);
+        // Across its direction too the lobe is no mirror's; what transmits light is isotropic and may be smooth.
+        material.roughness = is_dielectric(material) ? material.roughness : max(material.roughness, LEAST_ROUGHNESS);
+    } else {
+        material.anisotropy = 0.0;
+    }
+}
+
 // The material at a place, whose shading normals are turned.
 Material material_of(Hit hit, MaterialPoint point, inout Surface surface) {
     Material material = textured_material(surface.material, point);
     lean_normals(hit, point, surface);
+    if (ANISOTROPY && material.anisotropy > 0.0) {
+        turn_anisotropy(hit, surface, material);
+    }
     return material;
 }
 

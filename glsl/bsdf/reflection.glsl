@@ -45,6 +45,17 @@ struct Sheen {
     float roughness;
 };
 
+// KHR_materials_anisotropy: GGX with another α along a direction of the surface.
+layout(constant_id = 34) const bool ANISOTROPY = false;
+
+bool carries_layers() {
+    bool carries = SHEEN;
+    if (ANISOTROPY) {
+        carries = true;
+    }
+    return carries;
+}
+
 struct Bsdf {
     vec3 diffuse;   // albedo of the base
     vec3 f0;        // reflectance of the boundary at normal and at grazing incidence
@@ -53,10 +64,12 @@ struct Bsdf {
     vec2 over_base; // largest channel of what reflects over the base, at normal and at grazing incidence
     float coat;     // what lies above both, see KHR_materials_clearcoat: how much of a dielectric's reflection it has
     Sheen sheen;    // between
+    float along;    // α along `direction`, where it is another; else 0
+    uint direction; // octahedral
 };
 
 Bsdf lambertian(vec3 albedo) {
-    return Bsdf(albedo, vec3(0.0), 0.0, 0.0, vec2(0.0), 0.0, Sheen(vec3(0.0), 0.0));
+    return Bsdf(albedo, vec3(0.0), 0.0, 0.0, vec2(0.0), 0.0, Sheen(vec3(0.0), 0.0), 0.0, 0u);
 }
 
 vec3 fresnel(Bsdf bsdf, float cosine) {
@@ -66,6 +79,36 @@ vec3 fresnel(Bsdf bsdf, float cosine) {
 // What gets through to the base, alike for all colours (KHR_materials_specular), and past what isn't metal alone.
 float through_to_base(Bsdf bsdf, float cosine) {
     return 1.0 - mix(bsdf.over_base.x, bsdf.over_base.y, schlick(cosine));
+}
+
+bool is_anisotropic(Bsdf bsdf) {
+    return ANISOTROPY && bsdf.along > 0.0;
+}
+
+// The direction along which α is another, the one across it, and the normal.
+mat3 frame_of(Bsdf bsdf, vec3 n) {
+    vec3 t = decode_direction(bsdf.direction);
+    t -= dot(t, n) * n;
+    float length2 = dot(t, t);
+    mat3 frame = basis(n);
+    if (length2 > 1e-6) {
+        t *= inversesqrt(length2);
+        frame = mat3(t, cross(n, t), n);
+    }
+    return frame;
+}
+
+// Λ's square root of a direction, and the density of microfacet normals, as microfacet.glsl has them for one α: Heitz, 2014,
+// section 5.4.
+float masking_root(Bsdf bsdf, mat3 frame, vec3 v) {
+    return length(v * frame * vec3(bsdf.along, bsdf.alpha, 1.0));
+}
+
+float ggx(Bsdf bsdf, mat3 frame, vec3 h) {
+    float a2 = bsdf.along * bsdf.alpha;
+    vec3 q = h * frame * vec3(bsdf.alpha, bsdf.along, a2);
+    float d = dot(q, q);
+    return a2 * a2 * a2 / (PI * d * d);
 }
 
 bool has_sheen(Bsdf bsdf) {
@@ -92,6 +135,10 @@ vec3 evaluate_bsdf(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
     float alpha = max(bsdf.alpha, SMOOTH_ALPHA);
     float visibility = 0.5 / (nl * masking_root(alpha, nv) + nv * masking_root(alpha, nl));
     float lobe = bsdf.alpha < SMOOTH_ALPHA ? 0.0 : ggx(alpha, n, h) * visibility;
+    if (is_anisotropic(bsdf)) {
+        mat3 frame = frame_of(bsdf, n);
+        lobe = ggx(bsdf, frame, h) * 0.5 / (nl * masking_root(bsdf, frame, v) + nv * masking_root(bsdf, frame, l));
+    }
     vec3 value = through * bsdf.diffuse * (1.0 / PI) + f * lobe;
     if (has_sheen(bsdf)) {
         value = sheen_passes(bsdf, nv, nl) * value + bsdf.sheen.color * sheen_lobe(bsdf.sheen.roughness, nv, nl, n, h);
@@ -100,12 +147,27 @@ vec3 evaluate_bsdf(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
 }
 
 vec3 reflected_direction(Bsdf bsdf, vec3 n, vec3 v, vec2 u) {
-    return reflected_direction(bsdf.alpha, n, v, u);
+    vec3 l;
+    if (is_anisotropic(bsdf)) {
+        vec3 h = visible_normal(vec2(bsdf.along, bsdf.alpha), frame_of(bsdf, n), v, u);
+        l = normalize(2.0 * dot(v, h) * h - v);
+    } else {
+        l = reflected_direction(bsdf.alpha, n, v, u);
+    }
+    return l;
 }
 
 // Its density per solid angle.
 float reflected_density(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
-    return reflected_density(bsdf.alpha, n, v, l);
+    float density;
+    if (is_anisotropic(bsdf)) {
+        mat3 frame = frame_of(bsdf, n);
+        float nv = max(dot(n, v), 1e-6);
+        density = ggx(bsdf, frame, normalize(v + l)) * 0.5 / (nv + masking_root(bsdf, frame, v));
+    } else {
+        density = reflected_density(bsdf.alpha, n, v, l);
+    }
+    return density;
 }
 
 // Share of the samples that go to the boundary's reflection: at least a quarter, for what it mirrors may be bright.
@@ -133,6 +195,11 @@ vec3 reflected_weight(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
     bool smooth_boundary = bsdf.alpha < SMOOTH_ALPHA;
     float vh = smooth_boundary ? nv : dot(v, normalize(v + l));
     float masking = smooth_boundary ? 1.0 : (nl > 0.0 ? joint_masking(bsdf.alpha, nv, nl) : 0.0);
+    if (is_anisotropic(bsdf) && nl > 0.0) {
+        mat3 frame = frame_of(bsdf, n);
+        float root = masking_root(bsdf, frame, v);
+        masking = nl * (nv + root) / (nl * root + nv * masking_root(bsdf, frame, l));
+    }
     vec3 weight = fresnel(bsdf, vh) * (coat_passes(bsdf.coat, vh) * masking);
     return sheen_passes(bsdf, nv, smooth_boundary ? nv : max(nl, 0.0)) * weight;
 }
@@ -140,6 +207,7 @@ vec3 reflected_weight(Bsdf bsdf, vec3 n, vec3 v, vec3 l) {
 // The reflection of a boundary that paths follow has been taken away from what a visible point shows.
 Bsdf base_of(Bsdf bsdf) {
     bsdf.alpha = 0.0;
+    bsdf.along = 0.0;
     return bsdf;
 }
 
@@ -195,16 +263,17 @@ PackedBsdf pack_bsdf(Bsdf bsdf, vec3 viewer, bool coated) {
         PackedBsdf packed = pack_bsdf(bsdf, viewer, coated);                                                                       \
         buffer[2u * (slot)] = floatBitsToUint(packed.diffuse_viewer);                                                              \
         buffer[2u * (slot) + 1u] = packed.rest;                                                                                    \
-        if (SHEEN) {                                                                                                               \
+        if (carries_layers()) {                                                                                                    \
             buffer[2u * slots() + (slot)] = pack_layers(bsdf);                                                                     \
         }                                                                                                                          \
     }
 #define LOAD_BSDF(buffer, slot, normal) \
-    unpack_bsdf(PACKED_BSDF(buffer, slot), SHEEN ? TEXEL_BITS(buffer, 2u * slots() + (slot)) : uvec4(0u), normal)
+    unpack_bsdf(PACKED_BSDF(buffer, slot), carries_layers() ? TEXEL_BITS(buffer, 2u * slots() + (slot)) : uvec4(0u), normal)
 
 // A PackedLayers.
 uvec4 pack_layers(Bsdf bsdf) {
-    return uvec4(packHalf2x16(bsdf.sheen.color.rg), packHalf2x16(vec2(bsdf.sheen.color.b, bsdf.sheen.roughness)), 0u, 0u);
+    return uvec4(packHalf2x16(bsdf.sheen.color.rg), packHalf2x16(vec2(bsdf.sheen.color.b, bsdf.sheen.roughness)),
+                 packHalf2x16(vec2(bsdf.along, 0.0)), bsdf.direction);
 }
 
 VisibleBsdf unpack_bsdf(PackedBsdf packed, uvec4 layers, vec3 normal) {
@@ -213,7 +282,7 @@ VisibleBsdf unpack_bsdf(PackedBsdf packed, uvec4 layers, vec3 normal) {
     vec2 alpha_coat = unpackHalf2x16(packed.rest.z);
     Bsdf bsdf = Bsdf(packed.diffuse_viewer.rgb, vec3(unpackHalf2x16(packed.rest.x), f0_b_f90.x), f0_b_f90.y,
                      abs(alpha_coat.x), unpackHalf2x16(packed.rest.w), alpha_coat.y,
-                     Sheen(vec3(unpackHalf2x16(layers.x), sheen.x), sheen.y));
+                     Sheen(vec3(unpackHalf2x16(layers.x), sheen.x), sheen.y), unpackHalf2x16(layers.z).x, layers.w);
     return VisibleBsdf(normal, decode_direction(floatBitsToUint(packed.diffuse_viewer.w)), bsdf,
                        (packed.rest.z & COATED) != 0u);
 }

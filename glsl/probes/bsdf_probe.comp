@@ -62,7 +62,9 @@ void main() {
     Material glossy = material;
     glossy.surface = GLOSSY_SURFACE;
     Bsdf bsdf = bsdf_of(glossy);
-    f.brdf = vec4(evaluate_bsdf(bsdf, n, v, l), reflected_density(max(bsdf.alpha, SMOOTH_ALPHA), n, v, l));
+    Bsdf rough = bsdf;
+    rough.alpha = max(bsdf.alpha, SMOOTH_ALPHA);
+    f.brdf = vec4(evaluate_bsdf(bsdf, n, v, l), reflected_density(rough, n, v, l));
     vec3 outgoing = cosine_direction(frame.geometric_normal, a.u.zy);
     vec3 scattered = scatter(bsdf, frame, v, a.u, outgoing);
     f.scattered = vec4(scattered, reflection_probability(bsdf, dot(n, v)));

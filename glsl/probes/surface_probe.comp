@@ -29,7 +29,8 @@ struct Found {
     vec4 base_color; // w: roughness
     vec4 emission;   // w: metallic
     vec4 specular;   // f0; w: f90
-    vec4 others;     // transmission, coat, roughness of the coat
+    vec4 others;     // transmission, coat, roughness of the coat, anisotropy
+    vec4 direction;  // of that
 };
 
 layout(std430) readonly buffer ProbeFrom { Asked asked[]; };
@@ -54,6 +55,7 @@ void main() {
     f.base_color = vec4(material.base_color, material.roughness);
     f.emission = vec4(material.emission, material.metallic);
     f.specular = vec4(material.specular_f0, material.specular_f90);
-    f.others = vec4(material.transmission, material.coat, material.coat_roughness, 0.0);
+    f.others = vec4(material.transmission, material.coat, material.coat_roughness, material.anisotropy);
+    f.direction = vec4(decode_direction(material.anisotropy_direction), 0.0);
     found[i] = f;
 }

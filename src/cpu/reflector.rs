@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use half::f16;
 
 use super::sampling::{basis, decode_direction};
@@ -91,6 +91,8 @@ pub struct Reflector {
     pub coat: f64,
     /// Between.
     pub sheen: Sheen,
+    /// α along a direction of the surface, where that is another.
+    pub along: Option<(f64, DVec3)>,
 }
 
 /// What a coat lets through to what lies below.
@@ -109,6 +111,7 @@ impl Reflector {
             alpha: 0.0,
             coat: 0.0,
             sheen: Sheen::default(),
+            along: None,
         }
     }
 
@@ -125,6 +128,12 @@ impl Reflector {
     /// A glossy material's.
     pub fn glossy(material: &Material) -> Self {
         let (base, metallic) = (rgb(material.base_color), f64::from(material.metallic));
+        let alpha = f64::from(material.roughness).powi(2);
+        let along = (material.anisotropy > 0.0 && alpha >= SMOOTH_ALPHA).then(|| {
+            let part = f64::from(material.anisotropy).powi(2);
+            let direction = decode_direction(material.anisotropy_direction);
+            (alpha + (1.0 - alpha) * part, direction)
+        });
         Self {
             diffuse: base * (1.0 - metallic),
             f0: rgb(material.specular_f0).lerp(base, metallic),
@@ -133,9 +142,10 @@ impl Reflector {
                 rgb(material.specular_f0).max_element(),
                 f64::from(material.specular_f90),
             ],
-            alpha: f64::from(material.roughness).powi(2),
+            alpha,
             coat: f64::from(material.coat),
             sheen: Sheen::new(rgb(material.sheen_color), material.sheen_roughness.into()),
+            along,
         }
     }
 
@@ -170,6 +180,7 @@ impl Reflector {
             alpha: alpha_coat[0].abs(),
             coat: alpha_coat[1],
             sheen: Sheen::default(),
+            along: None,
         };
         let viewer = decode_direction(word(packed.diffuse_viewer));
         (reflector, viewer, packed.rest[2] & COATED != 0)
@@ -208,14 +219,40 @@ impl Reflector {
         self.alpha < SMOOTH_ALPHA
     }
 
+    /// The directions along and across which α differs, the normal, and both α.
+    fn frame(&self, n: DVec3) -> (DMat3, f64, f64) {
+        let isotropic = || (basis(n), self.alpha, self.alpha);
+        self.along.map_or_else(isotropic, |(along, t)| {
+            let t = t - t.dot(n) * n;
+            if t.length_squared() <= 1e-6 {
+                return (basis(n), along, self.alpha);
+            }
+            let t = t.normalize();
+            (DMat3::from_cols(t, n.cross(t), n), along, self.alpha)
+        })
+    }
+
+    /// A direction in that frame as GGX of α 1 has it, up to its length.
+    fn stretched(&self, n: DVec3, v: DVec3) -> DVec3 {
+        let (frame, along, across) = self.frame(n);
+        frame.transpose() * v * DVec3::new(along, across, 1.0)
+    }
+
     pub(super) fn ggx(&self, n: DVec3, h: DVec3) -> f64 {
-        let a2 = self.alpha * self.alpha;
-        a2 / (PI * (n.cross(h).length_squared() + a2 * n.dot(h).powi(2)).powi(2))
+        let (frame, along, across) = self.frame(n);
+        let a2 = along * across;
+        let q = frame.transpose() * h * DVec3::new(across, along, a2);
+        a2.powi(3) / (PI * q.length_squared().powi(2))
     }
 
     fn masking_root(&self, cosine: f64) -> f64 {
         let a2 = self.alpha * self.alpha;
         (a2 + (1.0 - a2) * cosine * cosine).sqrt()
+    }
+
+    /// The same of a direction, since α may have one.
+    fn root(&self, n: DVec3, v: DVec3) -> f64 {
+        self.stretched(n, v).length()
     }
 
     /// The BRDF, 1/sr, without what a smooth boundary mirrors.
@@ -229,7 +266,7 @@ impl Reflector {
         let lobe = if self.is_smooth() {
             DVec3::ZERO
         } else {
-            let visibility = 0.5 / (nl * self.masking_root(nv) + nv * self.masking_root(nl));
+            let visibility = 0.5 / (nl * self.root(n, v) + nv * self.root(n, l));
             self.fresnel(v.dot(h)) * self.ggx(n, h) * visibility
         };
         let below = (base + lobe) * self.sheen.passes(nv, nl);
@@ -256,14 +293,13 @@ impl Reflector {
 
     /// A microfacet's normal that v sees: Dupuy and Benyoub, «Sampling Visible GGX Normals with Spherical Caps», 2023.
     pub(super) fn visible_normal(&self, n: DVec3, v: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
-        let frame = basis(n);
-        let local = frame.transpose() * v;
-        let stretched = DVec3::new(self.alpha * local.x, self.alpha * local.y, local.z).normalize();
+        let (frame, along, across) = self.frame(n);
+        let stretched = self.stretched(n, v).normalize();
         let (sin, cos) = (2.0 * PI * u0).sin_cos();
         let z = (1.0 - u1) * (1.0 + stretched.z) - stretched.z;
         let sine = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
         let cap = DVec3::new(sine * cos, sine * sin, z) + stretched;
-        (frame * DVec3::new(self.alpha * cap.x, self.alpha * cap.y, cap.z.max(1e-6))).normalize()
+        (frame * DVec3::new(along * cap.x, across * cap.y, cap.z.max(1e-6))).normalize()
     }
 
     /// A reflected direction by the normals that v sees.
@@ -286,7 +322,7 @@ impl Reflector {
     /// Its density per solid angle.
     pub fn reflected_density(&self, n: DVec3, v: DVec3, l: DVec3) -> f64 {
         let nv = n.dot(v).max(1e-6);
-        self.ggx(n, (v + l).normalize()) * 0.5 / (nv + self.masking_root(nv))
+        self.ggx(n, (v + l).normalize()) * 0.5 / (nv + self.root(n, v))
     }
 
     /// BRDF · cos / density of a direction from [`Self::reflected_direction`], or of a mirror's.
@@ -299,6 +335,8 @@ impl Reflector {
             return DVec3::ZERO;
         }
         let vh = v.dot((v + l).normalize());
-        self.fresnel(vh) * coat_passes(self.coat, vh) * self.joint_masking(nv, nl) * self.sheen.passes(nv, nl)
+        let root = self.root(n, v);
+        let joint = nl * (nv + root) / (nl * root + nv * self.root(n, l));
+        self.fresnel(vh) * coat_passes(self.coat, vh) * joint * self.sheen.passes(nv, nl)
     }
 }

@@ -6,9 +6,11 @@ use half::f16;
 use super::Inputs;
 use super::interaction::is_hidden_back;
 use super::intersect::{Hit, PlacedTriangle, Progress, Ray, nearest_hit_from};
-use super::sampling::decode_direction;
+use super::sampling::{decode_direction, encode_direction};
 use super::surface::{Surface, surface_of};
-use crate::layout::{BLEND, MASK, Material, NO_TEXTURE, SEE_THROUGH, TEXTURE_FACTORS, TEXTURED_TRIANGLE};
+use crate::layout::{
+    BLEND, DIELECTRIC, LEAST_ROUGHNESS, MASK, Material, NO_TEXTURE, SEE_THROUGH, TEXTURE_FACTORS, TEXTURED_TRIANGLE,
+};
 use crate::packing::PackedScene;
 use crate::random::Random;
 
@@ -85,6 +87,34 @@ pub fn apply_textures(scene: &PackedScene, surface: &mut Surface) {
     let shading = leaning(surface.shading_normal, maps.normal_texture, maps.normal_scale);
     let coat = leaning(surface.coat_normal, maps.coat_normal_texture, maps.coat_normal_scale);
     (surface.shading_normal, surface.coat_normal) = (shading, coat);
+    if maps.anisotropy > 0.0 {
+        turn_anisotropy(surface, &place, at(maps.anisotropy_texture));
+    }
+}
+
+/// Turns the direction of anisotropy into render space. Without a tangent the material is isotropic.
+fn turn_anisotropy(surface: &mut Surface, place: &Place, value: Option<DVec4>) {
+    let material = &mut surface.material;
+    let mut turn = DVec2::from_angle(material.anisotropy_rotation.into());
+    if let Some(value) = value {
+        turn = turn.rotate(2.0 * value.truncate().truncate() - 1.0);
+        material.anisotropy *= value.z as f32;
+    }
+    let n = surface.shading_normal;
+    let t = place.tangent.truncate();
+    let t = t - t.dot(n) * n;
+    let has_direction = t.length_squared() >= 1e-12 && place.tangent.w != 0.0 && turn.length_squared() > 1e-6;
+    if has_direction && material.anisotropy > 0.0 {
+        let t = t.normalize();
+        let direction = turn.x * t + turn.y * place.tangent.w.signum() * n.cross(t);
+        material.anisotropy_direction = encode_direction(direction);
+        // Across its direction too the lobe is no mirror's; what transmits light is isotropic and may be smooth.
+        if material.surface != DIELECTRIC {
+            material.roughness = material.roughness.max(LEAST_ROUGHNESS as f32);
+        }
+    } else {
+        material.anisotropy = 0.0;
+    }
 }
 
 /// The normal `n` perturbed by a normal map, if it stays on the geometric normal's side.

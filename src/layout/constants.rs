@@ -217,6 +217,8 @@ shared_constants! {
 
     /// Boundaries with a smaller α are perfect mirrors.
     pub const SMOOTH_ALPHA: f64 = 1e-3;
+    /// Minimum roughness of anisotropic materials: their α across the direction is at least [`SMOOTH_ALPHA`].
+    pub const LEAST_ROUGHNESS: f64 = 0.031_623;
     /// Reflectance of a clear coat (refractive index 1.5) at normal incidence.
     pub const COAT_F0: f64 = 0.04;
     /// Shortest sampled wavelength, nm.

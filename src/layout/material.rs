@@ -8,7 +8,7 @@ use super::shape::{FieldLayout, Layout, Shared};
 
 device_structs! {
     /// A material. Textures are indices of [`TextureLookup`](super::TextureLookup)s, or [`NO_TEXTURE`]; each is a factor.
-    pub struct Material: 176 {
+    pub struct Material: 192 {
         /// Linear RGB albedo, reflectance or tint.
         pub base_color: [f32; 3],
         /// [`MATTE`], [`MIRROR`], [`DIELECTRIC`] or [`GLOSSY_SURFACE`].
@@ -77,6 +77,14 @@ device_structs! {
         pub sheen_color: [f32; 3],
         /// Of that.
         pub sheen_texture: u32,
+        /// How far its highlights are longer along their direction than across it.
+        pub anisotropy: f32,
+        /// Angle from the tangent to that direction, radians.
+        pub anisotropy_rotation: f32,
+        /// Of both: the direction in red and green, how far in blue.
+        pub anisotropy_texture: u32,
+        /// At a place: the octahedral direction.
+        pub anisotropy_direction: u32,
     }
 
     /// How a visible point's surface scatters, where the scene has glossy ones.
@@ -93,24 +101,24 @@ device_structs! {
     pub struct PackedLayers: 16 {
         /// f16s, two to a word: the sheen's reflectance, linear RGB, and its roughness.
         pub sheen: [u32; 2],
-        /// Zero.
-        pub padding0: u32,
-        /// Zero.
-        pub padding1: u32,
+        /// f16: GGX's α along the direction of anisotropy; 0 where it is the same all around.
+        pub along: u32,
+        /// That direction, octahedral.
+        pub direction: u32,
     }
 }
 
 /// What a visible point's BSDF can have beside a Lambertian lobe: constants of what makes visible points and gathers for them.
-pub const VISIBLE_LOBES: [&str; 2] = ["GLOSSY", "SHEEN"];
+pub const VISIBLE_LOBES: [&str; 3] = ["GLOSSY", "SHEEN", "ANISOTROPY"];
 
 /// Which of [`VISIBLE_LOBES`] there are.
 pub type VisibleLobes = [bool; VISIBLE_LOBES.len()];
 
 /// Texels that a visible point needs for these.
 pub fn packed_bsdf_texels(lobes: VisibleLobes) -> u64 {
-    let [glossy, layered] = lobes;
+    let [glossy, sheen, anisotropic] = lobes;
     let of = |present, bytes: usize| if present { bytes as u64 / 16 } else { 0 };
-    of(glossy, size_of::<PackedBsdf>()) + of(layered, size_of::<PackedLayers>())
+    of(glossy, size_of::<PackedBsdf>()) + of(sheen || anisotropic, size_of::<PackedLayers>())
 }
 
 /// What a texture multiplies in [`Material`]: a channel each.

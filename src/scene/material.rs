@@ -85,6 +85,15 @@ pub struct Sheen {
     pub roughness: f32,
 }
 
+/// KHR_materials_anisotropy: of the microfacets below coat and sheen.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Anisotropy {
+    /// 0 ..= 1; 0 for none.
+    pub strength: f32,
+    /// Angle from the tangent to the direction along which highlights are long, radians.
+    pub rotation: f32,
+}
+
 /// Where a surface is there at all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Alpha {
@@ -111,6 +120,8 @@ pub struct Layers {
     pub coat: Coat,
     /// Below it.
     pub sheen: Sheen,
+    /// Below both.
+    pub anisotropy: Anisotropy,
 }
 
 impl Layers {
@@ -121,7 +132,7 @@ impl Layers {
 
     /// Whether it is more than a mirror, which may have a coat.
     pub fn hide_mirrors(&self) -> bool {
-        self.sheen.color != Vec3::ZERO
+        self.sheen.color != Vec3::ZERO || self.anisotropy.strength > 0.0
     }
 }
 
@@ -178,6 +189,8 @@ material_textures! {
     sheen: sheen_texture,
     /// Its roughness, in alpha.
     sheen_roughness: sheen_roughness_texture,
+    /// Direction of anisotropy in red and green, how far in blue.
+    anisotropy: anisotropy_texture,
 }
 
 /// A glTF material, reduced to what is supported.
@@ -242,6 +255,8 @@ impl Material {
             coat_roughness: self.layers.coat.roughness,
             sheen_color: self.layers.sheen.color.to_array(),
             sheen_roughness: self.layers.sheen.roughness,
+            anisotropy: self.layers.anisotropy.strength,
+            anisotropy_rotation: self.layers.anisotropy.rotation,
             ..bytemuck::Zeroable::zeroed()
         };
         self.textures.pack(&mut record);
@@ -253,7 +268,7 @@ impl Material {
 
     /// Whether a place of a triangle makes something of it: by textures or by tangents.
     pub(crate) fn needs_corners(&self) -> bool {
-        self.textures.any()
+        self.textures.any() || self.layers.anisotropy.strength > 0.0
     }
 }
 
@@ -291,6 +306,8 @@ macro_rules! material_features {
             coat: "CLEARCOAT" = |it| it.coat > 0.0,
             /// Sheens.
             sheen: "SHEEN" = |it| it.sheen_color != [0.0; 3],
+            /// Microfacets whose highlights are longer in one direction.
+            anisotropic: "ANISOTROPY" = |it| it.anisotropy > 0.0,
             /// Surfaces whose back no camera sees.
             culling: "CULLING" = |it| it.flags & $crate::layout::BACK_HIDDEN != 0,
             $($rest)*

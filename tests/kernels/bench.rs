@@ -24,10 +24,17 @@ const LIT: &str = ", lit";
 const SOFTLY_LIT: &str = ", softly lit";
 /// The same with patterned emissive surfaces.
 const PATTERNED: &str = ", patterned";
+/// The same where all materials are anisotropic.
+const BRUSHED: &str = ", brushed";
 
 /// A scene of `scenes/`; with lights of every kind if the name ends in [`LIT`] or [`SOFTLY_LIT`], with patterned lamps if it ends
-/// in [`PATTERNED`].
+/// in [`PATTERNED`], with anisotropic materials if it ends in [`BRUSHED`].
 pub fn scene(name: &str) -> Scene {
+    if let Some(name) = name.strip_suffix(BRUSHED) {
+        let mut scene = scene(name);
+        brush(&mut scene);
+        return scene;
+    }
     if let Some(name) = name.strip_suffix(PATTERNED) {
         let mut scene = scene(name);
         add_pattern(&mut scene);
@@ -111,6 +118,38 @@ fn add_pattern(scene: &mut Scene) {
         .iter()
         .map(|p| [Vec2::new(p.x + 0.3 * p.y, p.z - 0.7 * p.y); 2]);
     scene.texcoords = places.collect();
+}
+
+/// Makes materials anisotropic, in a direction and by a strength that a texture has.
+fn brush(scene: &mut Scene) {
+    const SIDE: u32 = 8;
+    let mut lookup = TextureLookup::zeroed();
+    lookup.row_u = [1.0, 0.0, 0.0];
+    lookup.row_v = [0.0, 1.0, 0.0];
+    lookup.first_texel = scene.textures.texels.len() as u32;
+    lookup.size = SIDE | SIDE << 16;
+    lookup.flags = NEAREST;
+    let texel = |i: u32| {
+        let (sin, cos) = (i as f32).sin_cos();
+        let byte = |value: f32| (255.0 * value).round() as u32;
+        byte(0.5 + 0.5 * cos) | byte(0.5 + 0.5 * sin) << 8 | byte(1.0 - i as f32 / 80.0) << 16
+    };
+    scene.textures.texels.extend((0..SIDE * SIDE).map(texel));
+    scene.textures.lookups.push(lookup);
+    for material in &mut scene.materials {
+        material.textures.anisotropy = Some(scene.textures.lookups.len() as u32 - 1);
+        material.layers.anisotropy.strength = 0.8;
+        material.layers.anisotropy.rotation = 0.7;
+    }
+    if scene.texcoords.is_empty() {
+        scene.texcoords = scene.positions.iter().map(|p| [Vec2::new(p.x, p.z); 2]).collect();
+    }
+    // Off the surfaces, with either side of the bitangent.
+    let tangent = |(i, n): (usize, &Vec3)| {
+        let t = n.any_orthonormal_vector() + 0.2 * n;
+        t.normalize().extend(if i / 16 % 2 == 0 { 1.0 } else { -1.0 })
+    };
+    scene.tangents = scene.normals.iter().enumerate().map(tangent).collect();
 }
 
 /// A scene in the device's layout.

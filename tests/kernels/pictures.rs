@@ -59,7 +59,7 @@ fn mean_of(samples: &[f64]) -> (f64, f64) {
 }
 
 /// A difference of means of 12 samples exceeds 7.5 of its standard errors with a probability of 2·10⁻⁷ (Student, 22 degrees of
-/// freedom): 51 numbers of each of 21 cases fail a correct pair of programs once in 4,500 runs. Blurring by the radii is the same
+/// freedom): 51 numbers of each of 24 cases fail a correct pair of programs once in 4,000 runs. Blurring by the radii is the same
 /// except for the number of maps: allowances of half a percent for a block and three thousandths for the whole picture are
 /// subtracted.
 #[test]
@@ -80,6 +80,9 @@ fn both_renderers_converge_to_the_same_picture() {
         ("glossy, lit", Estimator::Sppm, Direct::Light, 128),
         ("glossy, softly lit", Estimator::Sppm, Direct::Light, 128),
         ("glossy, patterned", Estimator::Sppm, Direct::Light, 128),
+        ("glossy, brushed", Estimator::Sppm, Direct::Light, 128),
+        ("glossy, brushed", Estimator::Sppm, Direct::Photons, 128),
+        ("glasses, brushed", Estimator::Sppm, Direct::Light, 128),
         ("glasses, lit", Estimator::Sppm, Direct::Light, 128),
         ("glasses, softly lit", Estimator::Sppm, Direct::Light, 128),
         // One bounce: direct light alone, without the photons' noise.

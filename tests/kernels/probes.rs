@@ -212,6 +212,8 @@ fn bsdfs(count: u32) -> Vec<AskedBsdf> {
             coat_roughness: [0.0, 0.1, 0.5][i % 3],
             sheen_color: [n[5][3], n[4][1], n[3][2]].map(|value| value * f32::from(u8::from(i % 3 == 1))),
             sheen_roughness: n[1][1],
+            anisotropy: n[5][2] * f32::from(u8::from(i % 4 == 3)),
+            anisotropy_direction: cpu::encode_direction(direction(n[2][2], n[1][3])),
             color_texture: NO_TEXTURE,
             ..Material::zeroed()
         };
@@ -566,6 +568,7 @@ struct FoundSurface {
     emission: [f32; 4],
     specular: [f32; 4],
     others: [f32; 4],
+    direction: [f32; 4],
 }
 
 #[test]
@@ -576,6 +579,9 @@ fn surfaces_are_what_their_textures_say_in_f64() {
         "instances",
         "glasses",
         "cornell-spheres, patterned",
+        "textures, brushed",
+        "instances, brushed",
+        "glasses, brushed",
     ] {
         let mut bench = Bench::new(name, small());
         let own = bench.scene.own_triangles;
@@ -633,8 +639,15 @@ fn surfaces_are_what_their_textures_say_in_f64() {
                 && near(found.specular, rgbw(material.specular_f0, material.specular_f90))
                 && near(
                     found.others,
-                    [material.transmission, material.coat, material.coat_roughness, 0.0],
-                );
+                    [
+                        material.transmission,
+                        material.coat,
+                        material.coat_roughness,
+                        material.anisotropy,
+                    ],
+                )
+                && (material.anisotropy == 0.0
+                    || xyz(found.direction).distance(cpu::decode_direction(material.anisotropy_direction)) < 1e-3);
             agreement.note(same, || format!("{found:?} instead of {surface:?}, {share} there"));
         }
         // Slivers have uncertain normals; a nearest texel may be the next one.

@@ -45,6 +45,18 @@ pub fn assert_plate_shows(
     expected: impl Fn(f64) -> f64,
     tolerance: f64,
 ) {
+    assert_plate_shows_towards(material, direct, photons, what, |v| expected(v.z), tolerance);
+}
+
+/// As a function of the direction to the viewer: the plate's texture coordinates grow along x and against y, and z is its normal.
+pub fn assert_plate_shows_towards(
+    material: impl FnOnce(&mut Document) -> Value,
+    direct: Direct,
+    photons: u32,
+    what: &str,
+    expected: impl Fn(DVec3) -> f64,
+    tolerance: f64,
+) {
     let mut scene = Document::new("plate");
     let material = material(&mut scene);
     let plate = scene.material(material);
@@ -57,7 +69,7 @@ pub fn assert_plate_shows(
     let middle = Region::around([SIDE / 2; 2], 6);
     let expected = middle.mean(|[column, row]| {
         let (_, direction) = camera_ray(&scene, SIDE, [column as f64 + 0.5, row as f64 + 0.5]);
-        expected(-direction.y)
+        expected(dvec3(-direction.x, direction.z, -direction.y))
     });
     let config = RenderConfig {
         direct,
@@ -105,6 +117,7 @@ fn a_coated_plate_in_uniform_light_shows_its_coat_and_its_base() {
         alpha: 1.0,
         coat: 0.0,
         sheen: Default::default(),
+        along: None,
     };
     let nothing = json!({"specularFactor": 0});
     let black_material = with_extension(matte("black", [0.0; 3]), "KHR_materials_specular", nothing);
@@ -124,6 +137,7 @@ fn a_coated_plate_in_uniform_light_shows_its_coat_and_its_base() {
             alpha: roughness * roughness,
             coat: 0.0,
             sheen: Default::default(),
+            along: None,
         };
         let below = Reflector { coat: factor, ..base };
         for direct in [Direct::Light, Direct::Photons] {
@@ -182,6 +196,7 @@ fn the_normals_of_the_base_change_nothing_of_a_rough_coat() {
         alpha: 0.36,
         coat: 0.0,
         sheen: Default::default(),
+        along: None,
     };
     for direct in [Direct::Light, Direct::Photons] {
         for lean in [0.0, 45_f64.to_radians()] {

@@ -25,6 +25,7 @@ pub fn metal(alpha: f64) -> Reflector {
         alpha,
         coat: 0.0,
         sheen: Default::default(),
+        along: None,
     }
 }
 
@@ -37,7 +38,26 @@ pub fn plastic(alpha: f64) -> Reflector {
         alpha,
         coat: 0.0,
         sheen: Default::default(),
+        along: None,
     }
+}
+
+/// α is another one along a direction that is turned from x towards y.
+pub fn brushed(across: f64, along: f64, turn: f64) -> Reflector {
+    Reflector {
+        along: Some((along, dvec3(turn.cos(), turn.sin(), 0.0))),
+        ..metal(across)
+    }
+}
+
+/// With what they are called.
+fn metals() -> Vec<(String, Reflector)> {
+    let isotropic = ALPHAS.map(|alpha| (format!("α {alpha}"), metal(alpha)));
+    let anisotropic = [(0.02, 0.1, 0.0), (0.1, 0.5, 0.7), (0.3, 1.0, 1.5)].map(|(across, along, turn)| {
+        let name = format!("α {across} and {along}, turned by {turn}");
+        (name, brushed(across, along, turn))
+    });
+    isotropic.into_iter().chain(anisotropic).collect()
 }
 
 fn viewer(cosine: f64) -> DVec3 {
@@ -48,16 +68,30 @@ fn uniform(index: u32, kind: PathKind) -> [f64; 4] {
     Random::new(kind, index, 0, 0).next4()
 }
 
-/// A microfacet normal by two numbers in [0, 1), whose first one is tan²θ / (α² + tan²θ), and the solid angle of a unit of
-/// both: neither has a peak where α is small.
-fn microfacet(alpha: f64, [s, turn]: [f64; 2]) -> (DVec3, f64) {
-    let tan2 = alpha * alpha * s / (1.0 - s);
-    let cos = (1.0 + tan2).sqrt().recip();
-    let sin = (1.0 - cos * cos).sqrt();
-    let (sin_phi, cos_phi) = (2.0 * PI * turn).sin_cos();
-    // dω = sin θ dθ dφ, and d(tan²θ) = 2 tan θ / cos²θ dθ
-    let solid_angle = PI * cos.powi(3) * alpha * alpha / (1.0 - s).powi(2);
-    (dvec3(sin * cos_phi, sin * sin_phi, cos), solid_angle)
+/// The directions along and across which α differs, and both α.
+fn axes(reflector: &Reflector) -> ([DVec3; 2], [f64; 2]) {
+    let (along, t) = reflector.along.unwrap_or((reflector.alpha, DVec3::X));
+    ([t, DVec3::Z.cross(t)], [along, reflector.alpha])
+}
+
+/// A microfacet normal by two numbers in [0, 1), and the solid angle of a unit of both. The first one is x / (1 + x), where x is the
+/// square of the slope in units of α, so that neither has a peak where α is small.
+fn microfacet(reflector: &Reflector, [s, turn]: [f64; 2]) -> (DVec3, f64) {
+    let ([t, b], [along, across]) = axes(reflector);
+    let slope = (s / (1.0 - s)).sqrt();
+    let (sin, cos) = (2.0 * PI * turn).sin_cos();
+    let normal = (along * slope * cos * t + across * slope * sin * b + DVec3::Z).normalize();
+    // An area of slopes is dω / cos³θ, and d(slope²) = ds / (1 − s)².
+    let solid_angle = PI * normal.z.powi(3) * along * across / (1.0 - s).powi(2);
+    (normal, solid_angle)
+}
+
+/// The numbers of a microfacet normal.
+fn numbers_of(reflector: &Reflector, h: DVec3) -> [f64; 2] {
+    let ([t, b], [along, across]) = axes(reflector);
+    let (x, y) = (h.dot(t) / (h.z * along), h.dot(b) / (h.z * across));
+    let slope2 = x * x + y * y;
+    [slope2 / (1.0 + slope2), y.atan2(x) / (2.0 * PI)]
 }
 
 /// χ² over 16 × 16 cells of microfacet normals. By Wilson and Hilferty's transformation it is a normal number, which
@@ -67,18 +101,16 @@ fn reflected_directions_have_the_density_that_is_said() {
     const CELLS: usize = 16;
     const FINE: usize = 64;
     const SAMPLES: u32 = 200_000;
-    for (alpha, cosine) in ALPHAS
+    for ((name, reflector), cosine) in metals()
         .into_iter()
-        .flat_map(|alpha| COSINES.map(|cosine| (alpha, cosine)))
+        .flat_map(|metal| COSINES.map(|cosine| (metal.clone(), cosine)))
     {
-        let (reflector, n, v) = (metal(alpha), DVec3::Z, viewer(cosine));
+        let (n, v) = (DVec3::Z, viewer(cosine));
         let mut found = vec![0.0; CELLS * CELLS];
         for index in 0..SAMPLES {
             let [u0, u1, ..] = uniform(index, PathKind::Camera);
             let h = (v + reflector.reflected_direction(n, v, [u0, u1])).normalize();
-            let tan2 = (1.0 - h.z * h.z) / (h.z * h.z);
-            let s = tan2 / (alpha * alpha + tan2);
-            let turn = h.y.atan2(h.x) / (2.0 * PI);
+            let [s, turn] = numbers_of(&reflector, h);
             let cell = |x: f64| ((x - x.floor()) * CELLS as f64).min(CELLS as f64 - 1.0) as usize;
             found[cell(s.min(1.0 - 1e-12)) * CELLS + cell(turn)] += 1.0;
         }
@@ -88,7 +120,7 @@ fn reflected_directions_have_the_density_that_is_said() {
             let mut share = 0.0;
             for i in 0..FINE * FINE {
                 let at = |cell: usize, i: usize| (cell as f64 + (i as f64 + 0.5) / FINE as f64) / CELLS as f64;
-                let (h, solid_angle) = microfacet(alpha, [at(cell / CELLS, i / FINE), at(cell % CELLS, i % FINE)]);
+                let (h, solid_angle) = microfacet(&reflector, [at(cell / CELLS, i / FINE), at(cell % CELLS, i % FINE)]);
                 let vh = v.dot(h);
                 if vh > 0.0 {
                     let l = 2.0 * vh * h - v;
@@ -105,9 +137,9 @@ fn reflected_directions_have_the_density_that_is_said() {
         let freedom: f64 = cells - 1.0;
         let spread = 2.0 / (9.0 * freedom);
         let z = ((chi2 / freedom).cbrt() - (1.0 - spread)) / spread.sqrt();
-        println!("α {alpha}, cos {cosine}: χ² {chi2:.1} of {cells} cells, {z:.2} deviations");
-        assert!(cells > 30.0, "α {alpha}, cos {cosine}: {cells} cells");
-        assert!(z < 6.0, "α {alpha}, cos {cosine}: χ² {chi2} of {cells} cells");
+        println!("{name}, cos {cosine}: χ² {chi2:.1} of {cells} cells, {z:.2} deviations");
+        assert!(cells > 30.0, "{name}, cos {cosine}: {cells} cells");
+        assert!(z < 6.0, "{name}, cos {cosine}: χ² {chi2} of {cells} cells");
     }
 }
 
@@ -123,6 +155,7 @@ fn light_and_viewer_may_change_places() {
         let (v, l) = (direction(a, b), direction(c, d));
         let reflector = Reflector {
             coat: f,
+            along: (index % 2 == 0).then(|| (0.02 + f, dvec3(a, b - 0.5, 0.0).normalize())),
             ..plastic(0.02 + e)
         };
         let (one, other) = (reflector.brdf(DVec3::Z, v, l), reflector.brdf(DVec3::Z, l, v));
@@ -130,9 +163,14 @@ fn light_and_viewer_may_change_places() {
     }
 }
 
-/// ∫ BRDF · cos by the microfacet normals' own measure, and the base's by angle; without what a smooth boundary mirrors.
+/// ∫ BRDF · cos for a viewer at this cosine.
 pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
-    let (n, v) = (DVec3::Z, viewer(cosine));
+    albedo_towards(reflector, viewer(cosine), steps)
+}
+
+/// ∫ BRDF · cos by the microfacet normals' own measure, and the base's by angle; without what a smooth boundary mirrors.
+pub fn albedo_towards(reflector: Reflector, v: DVec3, steps: u32) -> DVec3 {
+    let n = DVec3::Z;
     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(steps);
     let base = Reflector {
         alpha: 0.0,
@@ -149,7 +187,7 @@ pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
             (1.0 - s).sqrt(),
         );
         sum += base.brdf(n, v, l) * PI;
-        let (h, solid_angle) = microfacet(reflector.alpha, [s, turn]);
+        let (h, solid_angle) = microfacet(&reflector, [s, turn]);
         let l = 2.0 * v.dot(h) * h - v;
         if reflector.alpha > 0.0 && v.dot(h) > 0.0 && l.z > 0.0 {
             sum += mirrors.brdf(n, v, l) * l.z * 4.0 * v.dot(h) * solid_angle;
@@ -162,13 +200,13 @@ pub fn albedo(reflector: Reflector, cosine: f64, steps: u32) -> DVec3 {
 #[test]
 fn a_metal_reflects_no_more_than_arrives_and_samples_weigh_what_the_integral_says() {
     const SAMPLES: u32 = 20_000;
-    for (alpha, cosine) in ALPHAS
+    for ((name, metal), cosine) in metals()
         .into_iter()
-        .flat_map(|alpha| COSINES.map(|cosine| (alpha, cosine)))
+        .flat_map(|metal| COSINES.map(|cosine| (metal.clone(), cosine)))
     {
         let white = Reflector {
             f0: DVec3::ONE,
-            ..metal(alpha)
+            ..metal
         };
         let expected = albedo(white, cosine, 1024).x;
         let v = viewer(cosine);
@@ -182,9 +220,9 @@ fn a_metal_reflects_no_more_than_arrives_and_samples_weigh_what_the_integral_say
         found.assert_between(
             expected * 0.999,
             expected * 1.001,
-            &format!("α {alpha}, cos {cosine}, white metal"),
+            &format!("{name}, cos {cosine}, white metal"),
         );
-        assert!(expected < 1.001, "α {alpha}, cos {cosine}: {expected}");
+        assert!(expected < 1.001, "{name}, cos {cosine}: {expected}");
     }
 }
 
@@ -252,6 +290,7 @@ fn a_base_lies_under_the_largest_channel_of_what_is_no_metal() {
         alpha: 0.0,
         coat: 0.0,
         sheen: Default::default(),
+        along: None,
     };
     for cosine in COSINES {
         let l = dvec3(-viewer(cosine).x, 0.0, cosine);

@@ -11,6 +11,7 @@ use ppm_vk::internals::scene::Environment;
 use serde_json::{Value, json};
 
 use crate::document::{Document, clear, light, matte, metallic_roughness, mirror};
+use crate::gloss::metal;
 use crate::lamp::{SIDE, assert_floor_is_lit_by, config};
 use crate::measure::{Region, measure};
 use crate::mesh::Mesh;
@@ -93,10 +94,26 @@ fn a_directional_light_brings_its_lux_times_the_cosine() {
 fn polished_metal_shows_the_highlight_of_a_point() {
     const ROUGHNESS: f64 = 0.25;
     const F0: [f64; 3] = [0.9, 0.6, 0.3];
+    let reflector = Reflector {
+        f0: F0.into(),
+        ..metal(ROUGHNESS * ROUGHNESS)
+    };
+    let material = metallic_roughness("metal", F0, 1.0, ROUGHNESS);
+    assert_shows_highlights(|_| material, &Mesh::facing_up(1.5, 0.0), reflector, "polished");
+}
+
+/// The highlights of a point and of a sun on a floor that reflects like this.
+pub fn assert_shows_highlights(
+    material: impl FnOnce(&mut Document) -> Value,
+    floor: &Mesh,
+    reflector: Reflector,
+    what: &str,
+) {
     let mut scene = Document::new("highlight");
-    let metal = scene.material(metallic_roughness("metal", F0, 1.0, ROUGHNESS));
+    let material = material(&mut scene);
+    let metal = scene.material(material);
     let black = scene.material(matte("black", BLACK));
-    scene.object("floor", &Mesh::facing_up(1.5, 0.0), metal);
+    scene.object("floor", floor, metal);
     // A light beside the punctual one, to choose between.
     scene.object("dark", &Mesh::facing_down(0.1, 2.0), black);
     let place = DVec3::new(0.2, 1.5, -1.4);
@@ -107,15 +124,6 @@ fn polished_metal_shows_the_highlight_of_a_point() {
         .rotated([1.0, 0.0, 0.0], -0.8);
     scene.camera([1.2, 1.2], [0.0, 0.0], 40.0);
     let scene = subject(scene);
-    let reflector = Reflector {
-        diffuse: DVec3::ZERO,
-        f0: F0.into(),
-        f90: 1.0,
-        over_base: [0.0; 2],
-        coat: 0.0,
-        sheen: Default::default(),
-        alpha: ROUGHNESS * ROUGHNESS,
-    };
     let sun = DVec3::new(0.0, 0.8_f64.sin(), 0.8_f64.cos());
     let radiance = |point: DVec3| {
         let v = (DVec3::new(0.0, 1.2, 1.2) - point).normalize();
@@ -143,7 +151,7 @@ fn polished_metal_shows_the_highlight_of_a_point() {
                     radiance(origin - direction * (origin.y / direction.y))[index % 3]
                 }
             });
-            let what = format!("{estimator:?}, {region:?}, channel {}", index % 3);
+            let what = format!("{what}, {estimator:?}, {region:?}, channel {}", index % 3);
             // Sixteen places a pixel stand for its mean.
             found.assert_between(exact * 0.9995, exact * 1.0005, &what);
         }

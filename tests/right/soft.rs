@@ -236,6 +236,7 @@ fn polished_metal_shows_the_highlight_of_a_ball_once() {
         over_base: [0.0; 2],
         coat: 0.0,
         sheen: Default::default(),
+        along: None,
         alpha: ROUGHNESS * ROUGHNESS,
     };
     // All of it, and its parts, since a wrong place on the ball moves light between them.

@@ -151,6 +151,7 @@ fn a_surface_that_is_half_clear_scatters_the_other_half() {
         alpha: 0.0,
         coat: 0.0,
         sheen: Default::default(),
+        along: None,
     };
     for direct in [Direct::Light, Direct::Photons] {
         measured_and_expected(&subject, direct, |cosine| {

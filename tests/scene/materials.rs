@@ -258,6 +258,51 @@ fn invalid_sheens_are_refused_or_reported() {
         .assert_warns(&["its sheen", "passes no light"]);
 }
 
+fn with_anisotropy(mut material: Value, anisotropy: Value) -> Value {
+    material["extensions"]["KHR_materials_anisotropy"] = anisotropy;
+    material
+}
+
+/// A floor with texture coordinates, which anisotropy needs.
+fn anisotropic_floor(material: Value, anisotropy: Value) -> Fixture {
+    let mut room = floor_of(with_anisotropy(material, anisotropy));
+    let texcoords = room.add_floats("VEC2", 2, &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]);
+    room.set("/meshes/0/primitives/0/attributes/TEXCOORD_0", json!(texcoords));
+    room
+}
+
+#[test]
+fn anisotropy_is_what_the_file_says() {
+    let mirror = json!({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}});
+    let loaded = |anisotropy| {
+        let scene = anisotropic_floor(mirror.clone(), anisotropy).scene();
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        scene.materials[0].clone()
+    };
+    let brushed = loaded(json!({"anisotropyStrength": 0.5, "anisotropyRotation": -2}));
+    assert!(matches!(brushed.surface, Surface::Glossy(_)), "{:?}", brushed.surface);
+    let anisotropy = brushed.layers.anisotropy;
+    assert_eq!((anisotropy.strength, anisotropy.rotation), (0.5, -2.0));
+    let none = loaded(json!({"anisotropyRotation": 1}));
+    assert_eq!(none.surface, Surface::Mirror);
+}
+
+#[test]
+fn anisotropy_that_cannot_be_is_refused_or_told_of() {
+    let refused = [
+        (json!({"anisotropyStrength": -1}), "anisotropyStrength is -1"),
+        (json!({"anisotropyRotation": 1e39}), "anisotropyRotation is inf"),
+        (json!({"anisotropyStrength": "much"}), "KHR_materials_anisotropy"),
+    ];
+    for (anisotropy, what) in refused {
+        anisotropic_floor(matte(json!({})), anisotropy).assert_fails(&["material 0", what]);
+    }
+    let strong = json!({"anisotropyStrength": 2});
+    anisotropic_floor(matte(json!({})), strong).assert_warns(&["anisotropyStrength 2 is above 1"]);
+    let weak = json!({"anisotropyStrength": 0.5});
+    anisotropic_floor(glass(json!({})), weak).assert_warns(&["its anisotropy", "transmits no light"]);
+}
+
 #[test]
 fn a_coat_lies_on_any_surface() {
     let coat = |mut material: Value| {

@@ -82,3 +82,21 @@ fn the_second_set_serves_where_the_texture_asks_for_it() {
     room.set("/materials/0/normalTexture/texCoord", json!(1));
     assert_close(room.scene().tangents[0].truncate(), Vec3::Z.to_array());
 }
+
+#[test]
+fn anisotropy_gets_tangents_by_its_texture_or_else_by_the_first_set() {
+    let mut room = textured();
+    room.remove("/materials/0/normalTexture");
+    let turned = room.add_floats("VEC2", 2, &[0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+    room.set("/meshes/0/primitives/0/attributes/TEXCOORD_1", json!(turned));
+    let mut tangent = |extension| {
+        room.set("/materials/0/extensions/KHR_materials_anisotropy", extension);
+        room.scene().tangents.first().map(|tangent| tangent.truncate())
+    };
+    let texture = json!({"index": 0, "texCoord": 1});
+    let by_texture = tangent(json!({"anisotropyStrength": 1, "anisotropyTexture": texture}));
+    assert_close(by_texture.expect("tangents"), Vec3::Z.to_array());
+    let by_first = tangent(json!({"anisotropyStrength": 1}));
+    assert_close(by_first.expect("tangents"), Vec3::X.to_array());
+    assert_eq!(tangent(json!({"anisotropyTexture": texture})), None);
+}

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use bytemuck::Zeroable;
 
 use super::*;
+use crate::cpu::sampling::encode_direction;
 use crate::random::{PathKind, Random};
 
 fn normals(front: bool) -> Normals {
@@ -32,17 +33,25 @@ fn bsdfs() -> Vec<(String, Bsdf)> {
     };
     add("matte".into(), white, true);
     for roughness in [0.4, 0.7, 1.0] {
-        for (metallic, coat) in [(0.0, 0.0), (1.0, 0.0), (0.3, 0.8)] {
+        for (metallic, coat, anisotropy) in [
+            (0.0, 0.0, 0.0),
+            (1.0, 0.0, 0.0),
+            (0.3, 0.8, 0.0),
+            (0.0, 0.0, 0.9),
+            (1.0, 0.0, 0.5),
+        ] {
             let glossy = Material {
                 surface: GLOSSY_SURFACE,
                 roughness,
                 metallic,
                 coat,
                 coat_roughness: 0.5,
+                anisotropy,
+                anisotropy_direction: encode_direction(towards(0.0, 1.0)),
                 ..white
             };
             add(
-                format!("glossy {roughness}, metal {metallic}, coat {coat}"),
+                format!("glossy {roughness}, metal {metallic}, coat {coat}, anisotropy {anisotropy}"),
                 glossy,
                 true,
             );

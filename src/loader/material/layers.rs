@@ -9,13 +9,14 @@ use serde::de::DeserializeOwned;
 use super::{Reader, color, linear, used_normals};
 use crate::loader::diagnostic::{Check, damaged};
 use crate::loader::texture::TextureUse;
-use crate::scene::{Coat, Layers, MaterialTextures, Sheen};
+use crate::scene::{Anisotropy, Coat, Layers, MaterialTextures, Sheen};
 
 const CLEARCOAT: &str = "KHR_materials_clearcoat";
 const SHEEN: &str = "KHR_materials_sheen";
+const ANISOTROPY: &str = "KHR_materials_anisotropy";
 
 /// Their names.
-pub(crate) const EXTENSIONS: &[&str] = &[CLEARCOAT, SHEEN];
+pub(crate) const EXTENSIONS: &[&str] = &[CLEARCOAT, SHEEN, ANISOTROPY];
 
 /// What a material says of its coat.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -36,6 +37,15 @@ struct SheenExtension {
     sheen_color_texture: Option<Info>,
     sheen_roughness_factor: f32,
     sheen_roughness_texture: Option<Info>,
+}
+
+/// What it says of its anisotropy.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct AnisotropyExtension {
+    anisotropy_strength: f32,
+    anisotropy_rotation: f32,
+    anisotropy_texture: Option<Info>,
 }
 
 /// An extension of a material; `None` where it has none.
@@ -62,7 +72,9 @@ fn tangent_texture(material: &Material) -> Option<NormalTexture> {
 /// The set of texture coordinates that a material's tangents follow, if it needs some: that of its normal texture, or else of the
 /// coat's.
 pub(crate) fn tangent_set(material: &Material) -> Option<usize> {
-    let texture = tangent_texture(material)?;
+    let Some(texture) = tangent_texture(material) else {
+        return anisotropy_set(material);
+    };
     let extensions = texture.extensions.as_ref();
     let transform = extensions.and_then(|extensions| extensions.others.get("KHR_texture_transform"));
     let set = transform.and_then(|transform| transform.get("texCoord")?.as_u64());
@@ -71,11 +83,22 @@ pub(crate) fn tangent_set(material: &Material) -> Option<usize> {
         .filter(|&set| set < 2)
 }
 
+/// The same for anisotropy: that of its texture, or the first.
+fn anisotropy_set(material: &Material) -> Option<usize> {
+    let anisotropy = extension::<AnisotropyExtension>(material, ANISOTROPY).ok()??;
+    let set = anisotropy.anisotropy_texture.as_ref().map_or(0, |info| {
+        let texture = linear(info);
+        texture.transform.and_then(|it| it.tex_coord).unwrap_or(texture.set)
+    });
+    (anisotropy.anisotropy_strength > 0.0 && set < 2).then_some(set as usize)
+}
+
 impl Reader<'_> {
     pub(super) fn layers(&mut self) -> Check<Layers> {
         Ok(Layers {
             coat: self.coat()?,
             sheen: self.sheen()?,
+            anisotropy: self.anisotropy()?,
         })
     }
 
@@ -86,6 +109,7 @@ impl Reader<'_> {
     ) -> Check<Vec<(&'t mut Option<u32>, Option<TextureUse>)>> {
         let coat: Clearcoat = extension(self.json, CLEARCOAT)?.unwrap_or_default();
         let sheen: SheenExtension = extension(self.json, SHEEN)?.unwrap_or_default();
+        let anisotropy: AnisotropyExtension = extension(self.json, ANISOTROPY)?.unwrap_or_default();
         let coat_normal = coat.clearcoat_normal_texture.as_ref();
         textures.coat_normal_scale = coat_normal.map_or(0.0, |texture| texture.scale);
         let coat_normal = coat_normal.map(|texture| used_normals("clearcoatNormalTexture", texture));
@@ -101,6 +125,10 @@ impl Reader<'_> {
                 &mut textures.sheen_roughness,
                 sheen.sheen_roughness_texture.as_ref().map(linear),
             ),
+            (
+                &mut textures.anisotropy,
+                anisotropy.anisotropy_texture.as_ref().map(linear),
+            ),
         ])
     }
 
@@ -109,6 +137,26 @@ impl Reader<'_> {
         let [factor] = self.fractions("clearcoatFactor", [coat.clearcoat_factor])?;
         let [roughness] = self.fractions("clearcoatRoughnessFactor", [coat.clearcoat_roughness_factor])?;
         Ok(Coat { factor, roughness })
+    }
+
+    fn anisotropy(&mut self) -> Check<Anisotropy> {
+        let anisotropy: AnisotropyExtension = extension(self.json, ANISOTROPY)?.unwrap_or_default();
+        let [strength] = self.fractions("anisotropyStrength", [anisotropy.anisotropy_strength])?;
+        let rotation = anisotropy.anisotropy_rotation;
+        if !rotation.is_finite() {
+            return Err(format!(
+                "its anisotropyRotation is {rotation}, but it must be finite; correct it in the file"
+            ));
+        }
+        let transmits = self.extension(|extensions| extensions.transmission.as_ref());
+        if strength > 0.0 && transmits.is_some_and(|it| it.transmission_factor.0 > 0.0) {
+            self.warn(
+                "its anisotropy applies only to the part of it that transmits no light, where its roughness is above 0.03; \
+                 the rest is isotropic"
+                    .into(),
+            );
+        }
+        Ok(Anisotropy { strength, rotation })
     }
 
     fn sheen(&mut self) -> Check<Sheen> {
