@@ -1,6 +1,7 @@
 //! Tangents that the file does not have.
 
 use glam::{Vec3, Vec4};
+use ppm_vk::Remark;
 use serde_json::json;
 
 use crate::fixture::{Fixture, assert_close};
@@ -69,9 +70,23 @@ fn triangles_beyond_number_around_a_point_are_named() {
     assert!(scene.tangents.is_empty());
     let warnings = scene.warnings[0].text();
     assert!(
-        warnings.contains("mesh 0 \"floor\", primitive 0: its normal texture needs tangents"),
+        warnings.contains("mesh 0 \"floor\", primitive 0: its material needs tangents")
+            && warnings.contains("triangles meet in a point"),
         "{warnings}"
     );
+}
+
+#[test]
+fn tangents_that_lack_texture_coordinates_are_named() {
+    let mut room = textured();
+    room.remove("/meshes/0/primitives/0/attributes/TEXCOORD_0");
+    let warnings = room.scene().warnings;
+    let parts = [
+        "primitive 0: its material needs tangents",
+        "it has no texture coordinates",
+    ];
+    let named = |warning: &Remark| parts.iter().all(|part| warning.contains(part));
+    assert!(warnings.iter().any(named), "{warnings:#?}");
 }
 
 #[test]

@@ -94,15 +94,22 @@ impl<'a> Primitive<'a> {
             generated_tangents: None,
         };
         if !opened.attributes.has_tangents()
-            && opened.attributes.has_texcoords()
             && let Some(set) = document.root.materials.get(material).and_then(tangent_set)
         {
-            let triangles = (0..opened.triangle_count()).map(|triangle| opened.triangle(triangle));
-            opened.generated_tangents = tangents(&opened.attributes, triangles, set)?;
+            let has_texcoords = opened.attributes.has_texcoords();
+            if has_texcoords {
+                let triangles = (0..opened.triangle_count()).map(|triangle| opened.triangle(triangle));
+                opened.generated_tangents = tangents(&opened.attributes, triangles, set)?;
+            }
             if opened.generated_tangents.is_none() {
+                let why = if has_texcoords {
+                    format!("more than {MAX_AROUND} of its triangles meet in a point")
+                } else {
+                    "it has no texture coordinates".to_owned()
+                };
                 warnings.push(format!(
-                    "{label}: its normal texture needs tangents, which can't be made: more than {MAX_AROUND} of its \
-                     triangles meet in a point; it is rendered without that texture: export tangents"
+                    "{label}: its material needs tangents, which can't be made: {why}; it is rendered without normal \
+                     textures and anisotropy: export tangents"
                 ));
             }
         }
