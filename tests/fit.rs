@@ -1,5 +1,7 @@
-//! Kernels fit a GPU, according to a compiler: Mesa's RADV compiles them for a card that need not be present.
+//! Kernels fit a GPU, according to a compiler: Mesa's RADV compiles them for a card that need not be present. The limits are those
+//! of Debian 12's Mesa, which has no ray queries for that card: `scripts/driver backports-radv` checks the kernels with ray queries.
 
+use std::env;
 use std::path::Path;
 use std::process::Command;
 
@@ -13,17 +15,25 @@ const DRIVERS: [&str; 2] = [
     "/usr/share/vulkan/icd.d/radeon_icd.json",
 ];
 
+/// RADV, if the environment chooses it.
+fn chosen_driver() -> Option<String> {
+    env::var("VK_DRIVER_FILES")
+        .ok()
+        .filter(|files| files.contains("radeon_icd"))
+}
+
 /// The compiler's statistics of each kernel; `None`, with a message, without RADV.
 fn compiled(features: &str) -> Option<Vec<Value>> {
-    let Some(driver) = DRIVERS.into_iter().find(|driver| Path::new(driver).exists()) else {
+    let of_system = DRIVERS.into_iter().find(|driver| Path::new(driver).exists());
+    let Some(driver) = chosen_driver().or(of_system.map(str::to_owned)) else {
         println!("skipped: no RADV on this machine (Debian: mesa-vulkan-drivers)");
         return None;
     };
     let output = Command::new(env!("CARGO_BIN_EXE_ppm-vk"))
         .args(["bench", "kernels", "--json", "--features", features])
         .env("RADV_FORCE_FAMILY", CARD)
-        .env("VK_DRIVER_FILES", driver)
-        .env("VK_ICD_FILENAMES", driver)
+        .env("VK_DRIVER_FILES", &driver)
+        .env("VK_ICD_FILENAMES", &driver)
         .output()
         .expect("ppm-vk");
     assert!(
@@ -44,10 +54,17 @@ fn figure(kernel: &Value, name: &str) -> u64 {
 }
 
 /// Asserts that no kernel spills registers, and that enough subgroups of each fit a SIMD at once to hide the latency of memory.
-/// With ray queries, the driver's traversal is a part of the kernel.
+/// With ray queries, the driver's traversal is a part of the kernel; a driver that the environment chooses checks only those kernels.
 fn assert_fit(features: &str, least: u64, least_by_query: u64) {
-    let Some(kernels) = compiled(features) else { return };
+    let Some(mut kernels) = compiled(features) else { return };
     assert!(kernels.len() > 30, "{features}: {} kernels", kernels.len());
+    if chosen_driver().is_some() {
+        kernels.retain(|kernel| kernel["ray_query"] == true);
+        assert!(
+            !kernels.is_empty(),
+            "{features}: the driver has no ray queries for {CARD}"
+        );
+    }
     for kernel in &kernels {
         let mut stage = kernel["stage"].as_str().expect("a stage").to_owned();
         let by_query = kernel["ray_query"] == true;
@@ -73,11 +90,11 @@ fn kernels_that_know_no_feature_fit_twelve_times() {
 
 #[test]
 fn kernels_of_usual_scenes_fit_twelve_times() {
-    assert_fit("mirrors,dielectrics,glossy,textured", 12, 8);
+    assert_fit("mirrors,dielectrics,glossy,textured", 12, 10);
 }
 
 /// No scene uses all features.
 #[test]
 fn kernels_that_know_everything_fit_eight_times() {
-    assert_fit("all", 8, 6);
+    assert_fit("all", 8, 8);
 }

@@ -132,7 +132,7 @@ Interface coincident_interfaces(Hit hit, vec3 incoming, Media media, bool culls,
         keep(24u, first.position);
         keep(27u, first.geometric_normal);
         keep(30u, first.reach);
-        private_memory[STACK_SIZE + 33u] = first.object;
+        keep(33u, first.object);
         Progress progress = AT_ORIGIN;
         bool goes_on = true;
         while (goes_on) {
@@ -149,7 +149,7 @@ Interface coincident_interfaces(Hit hit, vec3 incoming, Media media, bool culls,
                 vec3 n = kept(27u);
                 vec3 reach = max(other.reach, kept(30u));
                 bool apart = abs(dot(other.position - kept(24u), n)) > ROUNDINGS * dot(abs(n), reach);
-                bool same_object = other.object == private_memory[STACK_SIZE + 33u];
+                bool same_object = other.object == kept_word(33u);
                 bool doubles = same_object && dot(other.geometric_normal, n) < -PARALLEL;
                 bool hidden = culls && is_hidden_back(other, other_material, incoming);
                 if (!apart && (!same_object || doubles) && !hidden) {

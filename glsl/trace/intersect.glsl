@@ -211,27 +211,43 @@ const uint KEPT_SIZE = 47u;
 // registers are scarce during it.
 uint private_memory[STACK_SIZE + KEPT_SIZE];
 
-void keep(uint at, vec3 value) {
-    private_memory[STACK_SIZE + at] = floatBitsToUint(value.x);
-    private_memory[STACK_SIZE + at + 1u] = floatBitsToUint(value.y);
-    private_memory[STACK_SIZE + at + 2u] = floatBitsToUint(value.z);
+// Where the kept values start. With ray queries no stack is indexed, and compilers turn an array whose indices are all constant
+// into registers. So the index depends on the settings there, although every driver's loops are longer than the stack.
+uint kept_from() {
+    uint from = STACK_SIZE;
+#ifdef RAY_QUERY
+    from = min(settings.loop_limit, from);
+#endif
+    return from;
 }
 
-vec3 kept(uint at) {
-    return vec3(uintBitsToFloat(private_memory[STACK_SIZE + at]), uintBitsToFloat(private_memory[STACK_SIZE + at + 1u]),
-                uintBitsToFloat(private_memory[STACK_SIZE + at + 2u]));
+void keep(uint at, uint value) {
+    private_memory[kept_from() + at] = value;
+}
+
+void keep(uint at, vec3 value) {
+    keep(at, floatBitsToUint(value.x));
+    keep(at + 1u, floatBitsToUint(value.y));
+    keep(at + 2u, floatBitsToUint(value.z));
 }
 
 void keep(uint at, uvec4 value) {
-    private_memory[STACK_SIZE + at] = value.x;
-    private_memory[STACK_SIZE + at + 1u] = value.y;
-    private_memory[STACK_SIZE + at + 2u] = value.z;
-    private_memory[STACK_SIZE + at + 3u] = value.w;
+    keep(at, value.x);
+    keep(at + 1u, value.y);
+    keep(at + 2u, value.z);
+    keep(at + 3u, value.w);
+}
+
+uint kept_word(uint at) {
+    return private_memory[kept_from() + at];
+}
+
+vec3 kept(uint at) {
+    return uintBitsToFloat(uvec3(kept_word(at), kept_word(at + 1u), kept_word(at + 2u)));
 }
 
 uvec4 kept_bits(uint at) {
-    return uvec4(private_memory[STACK_SIZE + at], private_memory[STACK_SIZE + at + 1u], private_memory[STACK_SIZE + at + 2u],
-                 private_memory[STACK_SIZE + at + 3u]);
+    return uvec4(kept_word(at), kept_word(at + 1u), kept_word(at + 2u), kept_word(at + 3u));
 }
 
 const float TIE = 16.0 / 16777216.0; // relative error of distances by rounding

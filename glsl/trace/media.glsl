@@ -92,7 +92,7 @@ uint left_medium(Media media, uint medium) {
 
 // In private memory.
 void keep_media(uint at, Media media) {
-    private_memory[STACK_SIZE + at] = media.first;
+    keep(at, media.first);
     if (NESTED) {
         keep(at, uvec4(media.first, media.others));
     }
@@ -100,7 +100,7 @@ void keep_media(uint at, Media media) {
 
 Media kept_media(uint at) {
     Media media = IN_VACUUM;
-    media.first = private_memory[STACK_SIZE + at];
+    media.first = kept_word(at);
     if (NESTED) {
         media.others = kept_bits(at).yzw;
     }
