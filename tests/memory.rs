@@ -9,7 +9,7 @@ mod fixture;
 mod picture;
 
 use ppm_vk::internals::backend::Backend;
-use ppm_vk::internals::config::{Estimator, RenderConfig, Totals};
+use ppm_vk::internals::config::{Accel, Estimator, RenderConfig, Totals};
 use ppm_vk::internals::gpu::best_device;
 use ppm_vk::internals::layout::VISIBLE_LOBES;
 use ppm_vk::internals::packing::SceneFeatures;
@@ -35,7 +35,7 @@ fn a_render_takes_the_predicted_memory() {
             estimator,
             ..small(160, 20_000)
         };
-        let foretold = Memory::of(&subject.packed, &config, &device);
+        let foretold = Memory::of(&subject.packed, &config, &device).expect("a device");
         let mut renderer = subject.renderer(config);
         let at_first = renderer.gpu().bytes();
         for _ in 0..4 {
@@ -53,14 +53,13 @@ fn a_render_takes_the_predicted_memory() {
     }
 }
 
-/// The room with this number of nodes that show one mesh of 10,082 triangles.
-fn with_nodes(count: u32) -> Subject {
-    const SIDE: u16 = 71;
+/// The room with this number of nodes that show one mesh of 2·side² triangles.
+fn with_nodes(count: u32, side: u16) -> Subject {
     let mut room = Fixture::room();
-    let place = |number: u16| f32::from(number) / f32::from(SIDE) - 0.5;
-    let vertices = (0..=SIDE).flat_map(|z| (0..=SIDE).map(move |x| [place(x), place(x) * place(z), place(z)]));
-    let corner = |x: u16, z: u16| z * (SIDE + 1) + x;
-    let squares = (0..SIDE).flat_map(|z| (0..SIDE).map(move |x| (x, z)));
+    let place = |number: u16| f32::from(number) / f32::from(side) - 0.5;
+    let vertices = (0..=side).flat_map(|z| (0..=side).map(move |x| [place(x), place(x) * place(z), place(z)]));
+    let corner = |x: u16, z: u16| z * (side + 1) + x;
+    let squares = (0..side).flat_map(|z| (0..side).map(move |x| (x, z)));
     let triangles = squares.flat_map(|(x, z)| {
         let [a, b, c, d] = [corner(x, z), corner(x, z + 1), corner(x + 1, z + 1), corner(x + 1, z)];
         [a, b, c, a, c, d]
@@ -82,14 +81,55 @@ fn with_nodes(count: u32) -> Subject {
 #[test]
 fn a_thousand_instances_of_a_mesh_take_hardly_more_memory_than_one_node() {
     let device = best_device().expect("a Vulkan device");
-    let bytes = |subject: &Subject| Memory::of(&subject.packed, &small(160, 20_000), &device).scene;
-    let (one, thousand) = (with_nodes(1), with_nodes(1000));
+    let memory = |subject: &Subject| Memory::of(&subject.packed, &small(160, 20_000), &device).expect("a device");
+    let bytes = |subject: &Subject| memory(subject).scene;
+    let (one, thousand) = (with_nodes(1, 71), with_nodes(1000, 71));
     println!("{} bytes for one, {} for a thousand", bytes(&one), bytes(&thousand));
     assert_eq!((one.packed.instances.len(), thousand.packed.instances.len()), (0, 1000));
     assert_eq!(thousand.packed.seen_triangles(), 3 + 1000 * 10_082);
     assert!(4 * bytes(&thousand) < 5 * bytes(&one));
     // And on the host.
     assert_eq!(thousand.scene.positions.len(), one.scene.positions.len());
+}
+
+#[test]
+fn acceleration_structures_take_at_most_what_was_foretold() {
+    let device = best_device().expect("a Vulkan device");
+    if !device.ray_query {
+        println!("skipped: {} has no ray queries (VK_KHR_ray_query)", device.name);
+        return;
+    }
+    for (name, subject) in [
+        ("cornell", Subject::named("cornell")),
+        ("instances", Subject::named("instances")),
+        ("one mesh", with_nodes(1, 224)),
+    ] {
+        let config = RenderConfig {
+            accel: Accel::RayQuery,
+            ..small(32, 1000)
+        };
+        let foretold = Memory::of(&subject.packed, &config, &device).expect("a device");
+        let by_bvh = RenderConfig {
+            accel: Accel::Bvh,
+            ..config.clone()
+        };
+        let without = Memory::of(&subject.packed, &by_bvh, &device).expect("a device");
+        let mut renderer = subject.renderer(config);
+        let built = renderer.gpu().built_bytes();
+        println!(
+            "{name}: {} triangles, {} instances: {built} bytes, foretold {}",
+            subject.packed.shading_triangles.len(),
+            subject.packed.instances.len(),
+            foretold.structures
+        );
+        assert_eq!(without.structures, 0, "{name}");
+        assert_eq!(foretold.scene, without.scene + foretold.structures, "{name}");
+        assert!(
+            (1..=foretold.structures).contains(&built),
+            "{name}: {built} bytes, foretold at most {}",
+            foretold.structures
+        );
+    }
 }
 
 /// lavapipe binds at most 128 MiB. Pictures of the default width and larger fit, whatever a scene needs for its visible points.

@@ -104,6 +104,7 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
             "bounds": { "min": low.to_array(), "max": high.to_array() },
             "device_memory": memory.map(|(memory, config)| json!({
                 "scene_bytes": memory.scene,
+                "structure_bytes": memory.structures,
                 "render_bytes": memory.render,
                 "caustic_map_bytes": memory.caustic_map,
                 "resolution": config.resolution,
@@ -175,9 +176,15 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
         } else {
             String::new()
         };
+        let structures = if memory.structures > 0 {
+            let most = mebibytes(memory.structures);
+            format!(" (at most {most:.1} MiB of that for acceleration structures)")
+        } else {
+            String::new()
+        };
         writeln!(
             text,
-            "memory       {:.1} MiB of the device for the scene, {:.1} MiB for {width}x{height} and {photons} photon \
+            "memory       {:.1} MiB of the device for the scene{structures}, {:.1} MiB for {width}x{height} and {photons} photon \
              paths{caustic_map}",
             mebibytes(memory.scene),
             mebibytes(memory.render)
@@ -196,5 +203,5 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
 fn memory(scene: &Scene, prepared: &PreparedScene) -> Option<(Memory, RenderConfig)> {
     let config = RenderConfig::of(&scene.cameras[0]);
     let device = best_device().ok()?;
-    Some((prepared.memory(&config, &device), config))
+    Some((prepared.memory(&config, &device).ok()?, config))
 }

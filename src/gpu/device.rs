@@ -141,9 +141,15 @@ impl Device {
         copied
     }
 
-    /// Bytes of all buffers.
+    /// Bytes of all buffers and acceleration structures.
     pub fn bytes(&self) -> u64 {
-        self.buffers.values().map(|buffer| buffer.bytes).sum()
+        let buffers: u64 = self.buffers.values().map(|buffer| buffer.bytes).sum();
+        buffers + self.built_bytes()
+    }
+
+    /// Bytes of the acceleration structures; 0 if there are none.
+    pub fn built_bytes(&self) -> u64 {
+        self.acceleration.as_ref().map_or(0, Acceleration::bytes)
     }
 
     /// Bytes of the buffer `id`; 0 if it doesn't exist.

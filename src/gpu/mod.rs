@@ -13,11 +13,13 @@ mod pipeline_cache;
 mod ray_tracing;
 mod self_check;
 mod statistics;
+mod structures;
 mod submission;
 
 pub(crate) use device::remedy;
 pub use device::{Device, best_device, devices};
 pub use execute::{Done, Ticket};
 pub use instance::DeviceSummary;
-pub(crate) use ray_tracing::no_ray_query;
+pub use ray_tracing::StructureBytes;
+pub(crate) use ray_tracing::{no_ray_query, structure_bytes};
 pub use statistics::Compiler;

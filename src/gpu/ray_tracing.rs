@@ -1,17 +1,15 @@
 //! Acceleration structures for VK_KHR_ray_query, over the boxes of triangles; see `glsl/trace/ray_query.glsl`.
 
-use std::collections::BTreeMap;
 use std::ffi::CStr;
-use std::ops::Range;
 
 use ash::{khr, vk};
-use glam::{DMat3, DVec3, Vec3};
 use gpu_allocator::MemoryLocation;
 
 use super::buffer::Buffer;
-use super::context::{Context, OrVulkan};
+use super::context::{Context, DeviceSummary, OrVulkan, VulkanInstance};
 use super::device::Device;
-use crate::error::{Error, Result, Setting};
+use super::structures::{BYTES_OF_BOX, Plan, UNPLACED, barrier_after_builds, boxes, ranges_of, record_of};
+use crate::error::{Error, Remedy, Result, Setting};
 use crate::layout::{Instance, ShadingTriangle};
 
 /// Required extensions.
@@ -21,16 +19,11 @@ pub(super) const EXTENSIONS: [&CStr; 3] = [
     khr::deferred_host_operations::NAME,
 ];
 
-/// Alignment of structures.
-const ALIGNMENT: u64 = 256;
-/// Every ray sees every instance.
-const ALL: u32 = 0xff << 24;
-
 /// A device's functions, and the layout of the set that binds the acceleration structure.
 pub(super) struct RayTracing {
-    functions: khr::acceleration_structure::Device,
+    pub functions: khr::acceleration_structure::Device,
     pub set_layout: vk::DescriptorSetLayout,
-    scratch_alignment: u64,
+    pub scratch_alignment: u64,
 }
 
 /// Whether a device with [`EXTENSIONS`] has the features too.
@@ -81,6 +74,7 @@ impl RayTracing {
 }
 
 /// A scene's structures, and the set that binds them.
+#[derive(Default)]
 pub(super) struct Acceleration {
     structures: Vec<vk::AccelerationStructureKHR>,
     buffers: Vec<Buffer>,
@@ -89,6 +83,11 @@ pub(super) struct Acceleration {
 }
 
 impl Acceleration {
+    /// Bytes of the structures.
+    pub fn bytes(&self) -> u64 {
+        self.buffers.iter().map(|buffer| buffer.bytes).sum()
+    }
+
     /// The device must not be using it.
     pub fn free(self, context: &Context) {
         // SAFETY: as the caller says.
@@ -106,175 +105,68 @@ impl Acceleration {
     }
 }
 
-/// A structure to be built.
-struct Plan<'a> {
-    geometry: vk::AccelerationStructureGeometryKHR<'a>,
-    ty: vk::AccelerationStructureTypeKHR,
-    /// Triangles or instances.
-    count: u32,
-    bytes: u64,
-    scratch: u64,
-    structure: vk::AccelerationStructureKHR,
+/// Memory that acceleration structures need.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct StructureBytes {
+    /// Of the structures, at most: they are compacted after they are built.
+    pub structures: u64,
+    /// The largest single allocation.
+    pub at_once: u64,
 }
 
-impl<'a> Plan<'a> {
-    fn new(
-        tracing: &RayTracing,
-        ty: vk::AccelerationStructureTypeKHR,
-        geometry: vk::AccelerationStructureGeometryKHR<'a>,
-        count: u32,
-    ) -> Self {
-        let mut plan = Self {
-            geometry,
-            ty,
-            count,
-            bytes: 0,
-            scratch: 0,
-            structure: vk::AccelerationStructureKHR::null(),
-        };
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-        let on_device = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-        // SAFETY: the description is valid; addresses in it aren't read.
-        unsafe {
-            tracing.functions.get_acceleration_structure_build_sizes(
-                on_device,
-                &plan.description(),
-                &[count],
-                &mut sizes,
-            );
-        }
-        plan.bytes = sizes.acceleration_structure_size.next_multiple_of(ALIGNMENT);
-        plan.scratch = sizes.build_scratch_size;
-        plan
-    }
+/// The memory for the structures of a scene, see [`Device::trace_through`], on a device that is not open.
+///
+/// # Errors
+/// A device without ray queries, or one that cannot be opened.
+pub(crate) fn structure_bytes(
+    device: &DeviceSummary,
+    own_triangles: u32,
+    instances: &[Instance],
+) -> Result<StructureBytes> {
+    let shared = VulkanInstance::shared()?;
+    let mut devices = shared.devices()?.into_iter();
+    let found = devices.find(|(_, summary)| summary.index == device.index && summary.name == device.name);
+    let Some((physical, _)) = found else {
+        return Err(Error::unfit(
+            format!("no device {}", device.name),
+            Remedy::AnotherDevice,
+        ));
+    };
+    let context = Context::new(shared.clone(), physical, false)?;
+    let tracing = context.ray_tracing.as_ref();
+    let tracing = tracing.ok_or_else(|| no_ray_query(&device.name))?;
+    Ok(StructureBytes::of(tracing, own_triangles, instances))
+}
 
-    fn boxes(tracing: &RayTracing, boxes: vk::DeviceAddress, range: &Range<u32>) -> Self {
-        let aabbs = vk::AccelerationStructureGeometryAabbsDataKHR::default()
-            .data(vk::DeviceOrHostAddressConstKHR {
-                device_address: boxes + BYTES_OF_BOX * u64::from(range.start),
-            })
-            .stride(BYTES_OF_BOX);
-        let geometry = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::AABBS)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { aabbs });
-        let bottom = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
-        Self::new(tracing, bottom, geometry, range.end - range.start)
-    }
-
-    fn instances(tracing: &RayTracing, instances: vk::DeviceAddress, count: u32) -> Self {
-        let data = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(vk::DeviceOrHostAddressConstKHR {
-            device_address: instances,
-        });
-        let geometry = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data });
-        Self::new(tracing, vk::AccelerationStructureTypeKHR::TOP_LEVEL, geometry, count)
-    }
-
-    fn description(&self) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
-        vk::AccelerationStructureBuildGeometryInfoKHR::default()
-            .ty(self.ty)
-            .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
-            .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
-            .geometries(std::slice::from_ref(&self.geometry))
-    }
-
-    /// Records the build and a barrier after it.
-    fn build(&self, context: &Context, tracing: &RayTracing, commands: vk::CommandBuffer, scratch: vk::DeviceAddress) {
-        let mut description = self.description();
-        description.dst_acceleration_structure = self.structure;
-        description.scratch_data = vk::DeviceOrHostAddressKHR {
-            device_address: scratch.next_multiple_of(tracing.scratch_alignment),
-        };
-        let ranges = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(self.count)];
-        let builds = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
-        let (read, write) = (
-            vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR,
-            vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR,
-        );
-        let built = vk::MemoryBarrier::default()
-            .src_access_mask(write)
-            .dst_access_mask(read | write);
-        let next = builds | vk::PipelineStageFlags::COMPUTE_SHADER;
-        let none = vk::DependencyFlags::empty();
-        // SAFETY: the command buffer is recording; what is built from and into lives until it has been waited for.
-        unsafe {
-            tracing
-                .functions
-                .cmd_build_acceleration_structures(commands, &[description], &[&ranges]);
-            context
-                .device
-                .cmd_pipeline_barrier(commands, builds, next, none, &[built], &[], &[]);
+impl StructureBytes {
+    fn of(tracing: &RayTracing, own_triangles: u32, instances: &[Instance]) -> Self {
+        let ranges = ranges_of(own_triangles, instances);
+        let boxes = ranges.values().map(|range| u64::from(range.end)).max().unwrap_or(0) * BYTES_OF_BOX;
+        let bottom: Vec<Plan<'_>> = ranges.values().map(|range| Plan::boxes(tracing, 0, range)).collect();
+        let top = Plan::instances(tracing, 0, instances.len() as u32 + 1);
+        let bytes: u64 = bottom.iter().map(|plan| plan.bytes).sum();
+        let scratch = bottom.iter().chain([&top]).map(|plan| plan.scratch).max().unwrap_or(0);
+        Self {
+            structures: bytes + top.bytes,
+            at_once: bytes.max(top.bytes).max(scratch).max(boxes),
         }
     }
 }
-
-/// Two corners of three f32.
-const BYTES_OF_BOX: u64 = 24;
-
-/// Margin of boxes in render space, where triangles lie within about ±1: the rounding of a device's box test is unspecified.
-const WIDENING: f64 = 1.0 / 65536.0;
-
-/// Boxes of the triangles, widened by the margin of render space, transformed to the space of each.
-fn boxes(triangles: &[ShadingTriangle], ranges: &BTreeMap<u32, Range<u32>>, instances: &[Instance]) -> Vec<[Vec3; 2]> {
-    let mut boxes: Vec<[Vec3; 2]> = triangles
-        .iter()
-        .map(|triangle| {
-            let [a, b, c] = [triangle.p0, triangle.p1, triangle.p2].map(Vec3::from);
-            [a.min(b).min(c), a.max(b).max(c)]
-        })
-        .collect();
-    let mut widenings: BTreeMap<u32, f64> = ranges.keys().map(|&first| (first, WIDENING)).collect();
-    for instance in instances {
-        let widest = widenings.entry(instance.first_triangle).or_default();
-        *widest = widest.max(WIDENING * largest_coordinate(&instance.rows));
-    }
-    for (first, range) in ranges {
-        let by = Vec3::splat(widenings[first] as f32);
-        for [low, high] in &mut boxes[range.start as usize..range.end as usize] {
-            *low -= by;
-            *high += by;
-        }
-    }
-    boxes
-}
-
-/// Bound of the coordinates that points of render space have in the space of an instance, where its triangles lie within about ±1.
-fn largest_coordinate(rows: &[[f32; 4]; 3]) -> f64 {
-    let [x, y, z] = rows.map(|row| row.map(f64::from));
-    let linear = DMat3::from_cols_array_2d(&[x, y, z].map(|[a, b, c, _]| [a, b, c])).transpose();
-    let inverse = linear.inverse();
-    let from = DVec3::new(x[3], y[3], z[3]);
-    let abs = DMat3::from_cols(inverse.x_axis.abs(), inverse.y_axis.abs(), inverse.z_axis.abs());
-    1.0 + (abs * (DVec3::ONE + from.abs())).max_element()
-}
-
-/// The ranges of triangles that are one structure each: those in render space, if any, then those that instances share, by the
-/// first triangle.
-fn ranges_of(own_triangles: u32, instances: &[Instance]) -> BTreeMap<u32, Range<u32>> {
-    let own = (own_triangles > 0).then_some(0..own_triangles);
-    let shared = instances
-        .iter()
-        .map(|instance| instance.first_triangle..instance.first_triangle + instance.triangle_count);
-    own.into_iter()
-        .chain(shared)
-        .map(|range| (range.start, range))
-        .collect()
-}
-
-/// An instance in the device's layout: rows of its transform, mask, flags, structure.
-fn record_of(rows: &[[f32; 4]; 3], structure: vk::DeviceAddress) -> Vec<u8> {
-    let mut record = bytemuck::cast_slice(rows).to_vec();
-    for word in [ALL, 0] {
-        record.extend_from_slice(&u32::to_ne_bytes(word));
-    }
-    record.extend_from_slice(&structure.to_ne_bytes());
-    record
-}
-
-const UNPLACED: [[f32; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 impl Device {
+    /// The memory for the structures of a scene, see [`Device::trace_through`].
+    ///
+    /// # Errors
+    /// A device without ray queries.
+    pub fn structure_bytes(&self, own_triangles: u32, instances: &[Instance]) -> Result<StructureBytes> {
+        Ok(StructureBytes::of(self.ray_tracing()?, own_triangles, instances))
+    }
+
+    fn ray_tracing(&self) -> Result<&RayTracing> {
+        let tracing = self.context.ray_tracing.as_ref();
+        tracing.ok_or_else(|| no_ray_query(&self.summary.name))
+    }
+
     /// Builds the acceleration structures: the first `own_triangles` triangles are in render space, the others are placed by
     /// instances.
     ///
@@ -289,90 +181,158 @@ impl Device {
         if let Some(old) = self.acceleration.take() {
             old.free(&self.context);
         }
-        let mut temporary = Vec::new();
-        let built = self.build(triangles, own_triangles, instances, &mut temporary);
-        for buffer in temporary {
-            buffer.free(&self.context);
+        let mut made = Acceleration::default();
+        match self.build(triangles, own_triangles, instances, &mut made) {
+            Ok(()) => {
+                self.acceleration = Some(made);
+                Ok(())
+            }
+            Err(error) => {
+                made.free(&self.context);
+                Err(error)
+            }
         }
-        built
     }
 
-    /// `temporary` is not needed after the build.
     fn build(
         &mut self,
         triangles: &[ShadingTriangle],
         own_triangles: u32,
         instances: &[Instance],
-        temporary: &mut Vec<Buffer>,
+        made: &mut Acceleration,
     ) -> Result<()> {
-        let context = &self.context;
-        let tracing = context
-            .ray_tracing
-            .as_ref()
-            .ok_or_else(|| no_ray_query(&self.summary.name))?;
         let ranges = ranges_of(own_triangles, instances);
         let boxes = boxes(triangles, &ranges, instances);
-        let boxes = input(context, "boxes", bytemuck::cast_slice(&boxes), temporary)?;
-        let mut plans: Vec<Plan<'_>> = ranges
-            .values()
-            .map(|range| Plan::boxes(tracing, boxes, range))
-            .collect();
-
-        // From here on, failures have to free resources.
-        let mut made = Acceleration {
-            structures: Vec::new(),
-            buffers: Vec::new(),
-            pool: vk::DescriptorPool::null(),
-            set: vk::DescriptorSet::null(),
+        let (input, boxes) = build_input(&self.context, "boxes", bytemuck::cast_slice(&boxes))?;
+        let plan = |tracing| {
+            ranges
+                .values()
+                .map(|range| Plan::boxes(tracing, boxes, range))
+                .collect()
         };
-        let result = (|| {
-            make_structures(context, tracing, &mut plans, &mut made)?;
-            let address_of = |first: u32| {
-                let at = ranges.keys().position(|&key| key == first);
-                at.map_or(0, |at| {
-                    let info = vk::AccelerationStructureDeviceAddressInfoKHR::default()
-                        .acceleration_structure(plans[at].structure);
-                    // SAFETY: the structure is alive.
-                    unsafe { tracing.functions.get_acceleration_structure_device_address(&info) }
-                })
-            };
-            // An instance whose structure has the address 0 is inactive.
-            let own = if own_triangles > 0 { address_of(0) } else { 0 };
-            let mut records = record_of(&UNPLACED, own);
-            for instance in instances {
-                records.extend(record_of(&instance.rows, address_of(instance.first_triangle)));
-            }
-            let records = input(context, "placed structures", &records, temporary)?;
-            let mut top = [Plan::instances(tracing, records, instances.len() as u32 + 1)];
-            make_structures(context, tracing, &mut top, &mut made)?;
-            let [top] = top;
-            made.bind(context, tracing, top.structure)?;
-            let most = plans.iter().chain([&top]).map(|plan| plan.scratch).max().unwrap_or(0);
-            let bytes = most + tracing.scratch_alignment;
-            let scratch = addressable(context, "scratch", bytes, MemoryLocation::GpuOnly, SCRATCH)?;
-            let address = address(context, &scratch);
-            temporary.push(scratch);
-            Ok((top, address))
-        })();
-        match result {
-            Ok((top, scratch)) => {
-                self.acceleration = Some(made);
-                let slot = self.idle_slot()?;
-                let plans: Vec<_> = plans.into_iter().chain([top]).collect();
-                self.submit(slot, 1, |context, commands, _| {
-                    if let Some(tracing) = &context.ray_tracing {
-                        for plan in &plans {
-                            plan.build(context, tracing, commands, scratch);
-                        }
-                    }
-                })?;
-                self.wait(slot)
-            }
-            Err(error) => {
-                made.free(context);
-                Err(error)
-            }
+        let bottom = self.ray_tracing().map(plan);
+        let built = bottom.and_then(|bottom| self.build_compact(bottom, made));
+        input.free(&self.context);
+        let bottom = built?;
+
+        let tracing = self.ray_tracing()?;
+        let address_of = |first: u32| {
+            let at = ranges.keys().position(|&key| key == first);
+            at.map_or(0, |at| {
+                let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(bottom[at]);
+                // SAFETY: the structure is alive.
+                unsafe { tracing.functions.get_acceleration_structure_device_address(&info) }
+            })
+        };
+        // An instance whose structure has the address 0 is inactive.
+        let own = if own_triangles > 0 { address_of(0) } else { 0 };
+        let mut records = record_of(&UNPLACED, own);
+        for instance in instances {
+            records.extend(record_of(&instance.rows, address_of(instance.first_triangle)));
         }
+        let (input, records) = build_input(&self.context, "placed structures", &records)?;
+        let count = instances.len() as u32 + 1;
+        let top = self
+            .ray_tracing()
+            .map(|tracing| vec![Plan::instances(tracing, records, count)]);
+        let built = top.and_then(|top| self.build_compact(top, made));
+        input.free(&self.context);
+        let top = built?[0];
+        let context = &self.context;
+        made.bind(context, self.ray_tracing()?, top)
+    }
+
+    /// Builds structures that do not depend on each other, in as little memory as they need.
+    fn build_compact(
+        &mut self,
+        mut plans: Vec<Plan<'_>>,
+        made: &mut Acceleration,
+    ) -> Result<Vec<vk::AccelerationStructureKHR>> {
+        if plans.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut loose = Acceleration::default();
+        let built = self.build_loose(&mut plans, &mut loose);
+        let built = built.and_then(|()| self.compact(&mut plans, made));
+        loose.free(&self.context);
+        built.map(|()| plans.iter().map(|plan| plan.structure).collect())
+    }
+
+    fn build_loose(&mut self, plans: &mut [Plan<'_>], loose: &mut Acceleration) -> Result<()> {
+        let tracing = self.ray_tracing()?;
+        make_structures(&self.context, tracing, plans, loose)?;
+        let most = plans.iter().map(|plan| plan.scratch).max().unwrap_or(0);
+        let bytes = most + tracing.scratch_alignment;
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        let scratch = addressable(&self.context, "scratch", bytes, MemoryLocation::GpuOnly, usage)?;
+        let at = address(&self.context, &scratch);
+        let built = self.run_once(|context, tracing, commands| {
+            for plan in &*plans {
+                plan.build(context, tracing, commands, at);
+            }
+        });
+        scratch.free(&self.context);
+        built
+    }
+
+    /// Copies structures to new ones of the size that they need.
+    fn compact(&mut self, plans: &mut [Plan<'_>], made: &mut Acceleration) -> Result<()> {
+        let loose: Vec<_> = plans.iter().map(|plan| plan.structure).collect();
+        for (plan, bytes) in plans.iter_mut().zip(self.compacted_bytes(&loose)?) {
+            plan.take(bytes);
+        }
+        make_structures(&self.context, self.ray_tracing()?, plans, made)?;
+        self.run_once(|context, tracing, commands| {
+            for (plan, &from) in plans.iter().zip(&loose) {
+                let copy = vk::CopyAccelerationStructureInfoKHR::default()
+                    .src(from)
+                    .dst(plan.structure)
+                    .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
+                // SAFETY: the command buffer is recording; both structures live until it has been waited for.
+                unsafe { tracing.functions.cmd_copy_acceleration_structure(commands, &copy) };
+            }
+            barrier_after_builds(context, commands);
+        })
+    }
+
+    fn compacted_bytes(&mut self, structures: &[vk::AccelerationStructureKHR]) -> Result<Vec<u64>> {
+        let count = structures.len() as u32;
+        let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
+        let create = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(count);
+        // SAFETY: a plain creation call; destroyed below.
+        let pool = unsafe { self.context.device.create_query_pool(&create, None) }.or_vulkan("vkCreateQueryPool")?;
+        let told = self.run_once(|context, tracing, commands| {
+            // SAFETY: the command buffer is recording; pool and structures live until it has been waited for.
+            unsafe {
+                context.device.cmd_reset_query_pool(commands, pool, 0, count);
+                let functions = &tracing.functions;
+                functions.cmd_write_acceleration_structures_properties(commands, structures, ty, pool, 0);
+            }
+        });
+        let mut bytes = vec![0_u64; structures.len()];
+        let wait = vk::QueryResultFlags::WAIT;
+        // SAFETY: the pool is alive, and nothing uses it after the wait.
+        unsafe {
+            let device = &self.context.device;
+            let read = told.and_then(|()| {
+                let read = device.get_query_pool_results(pool, 0, &mut bytes, vk::QueryResultFlags::TYPE_64 | wait);
+                read.or_vulkan("vkGetQueryPoolResults")
+            });
+            device.destroy_query_pool(pool, None);
+            read?;
+        }
+        Ok(bytes)
+    }
+
+    /// Runs commands for acceleration structures to their end.
+    fn run_once(&mut self, record: impl Fn(&Context, &RayTracing, vk::CommandBuffer)) -> Result<()> {
+        let slot = self.idle_slot()?;
+        self.submit(slot, 1, |context, commands, _| {
+            if let Some(tracing) = &context.ray_tracing {
+                record(context, tracing, commands);
+            }
+        })?;
+        self.wait(slot)
     }
 }
 
@@ -381,8 +341,6 @@ pub(crate) fn no_ray_query(device: &str) -> Error {
     let what = format!("ray-query: device {device} has no VK_KHR_ray_query; use bvh or another device");
     Error::setting(Setting::Accel, what)
 }
-
-const SCRATCH: vk::BufferUsageFlags = vk::BufferUsageFlags::STORAGE_BUFFER;
 
 fn addressable(
     context: &Context,
@@ -401,8 +359,8 @@ fn address(context: &Context, buffer: &Buffer) -> vk::DeviceAddress {
     unsafe { context.device.get_buffer_device_address(&info) }
 }
 
-/// Uploads the input of a build; returns its device address, a multiple of 16.
-fn input(context: &Context, name: &str, content: &[u8], into: &mut Vec<Buffer>) -> Result<vk::DeviceAddress> {
+/// Uploads the input of a build; also returns its device address, a multiple of 16.
+fn build_input(context: &Context, name: &str, content: &[u8]) -> Result<(Buffer, vk::DeviceAddress)> {
     let usage = vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR;
     let bytes = content.len() as u64 + 16;
     let mut buffer = addressable(context, name, bytes, MemoryLocation::CpuToGpu, usage)?;
@@ -410,8 +368,7 @@ fn input(context: &Context, name: &str, content: &[u8], into: &mut Vec<Buffer>) 
     let aligned = address.next_multiple_of(16);
     let from = (aligned - address) as usize;
     buffer.mapped()[from..from + content.len()].copy_from_slice(content);
-    into.push(buffer);
-    Ok(aligned)
+    Ok((buffer, aligned))
 }
 
 /// Creates structures side by side in one buffer.

@@ -6,13 +6,27 @@ use std::collections::BTreeMap;
 use super::memory::scene_buffers;
 use super::stages::Stages;
 use crate::config::{RenderConfig, Totals};
-use crate::error::{Error, Remedy, Result};
-use crate::gpu::{DeviceSummary, remedy};
+use crate::error::{Error, Remedy, Result, Setting};
+use crate::gpu::{DeviceSummary, StructureBytes, remedy};
 use crate::packing::PackedScene;
 use crate::record::{Command, Recording};
 use crate::sizes::{Limits, Sizes};
 use crate::stage::{Access, BufferId};
 use crate::text;
+
+/// Reports acceleration structures that do not fit.
+pub(super) fn check_structures_fit(needed: StructureBytes, device: &DeviceSummary) -> Result<()> {
+    if needed.at_once <= device.max_allocation_bytes {
+        return Ok(());
+    }
+    let what = format!(
+        "ray-query: the acceleration structures need {} at once, device {} allocates {} at once at most; use bvh or another device",
+        text::bytes(needed.at_once),
+        device.name,
+        text::bytes(device.max_allocation_bytes)
+    );
+    Err(Error::setting(Setting::Accel, what))
+}
 
 /// A buffer that exceeds a device's limits.
 struct TooLarge {
@@ -161,6 +175,19 @@ mod tests {
         let error = check("cornell", [640, 480], &small).expect_err("1 MiB is too little");
         assert!(error.to_string().contains("allocates 1.0 MiB at once"), "{error}");
         check("cornell", advised(&error), &small).unwrap_or_else(|error| panic!("what was advised: {error}"));
+    }
+
+    #[test]
+    fn acceleration_structures_larger_than_what_can_be_allocated_are_told_with_another_way() {
+        let needed = StructureBytes {
+            structures: 3 << 20,
+            at_once: 2 << 20,
+        };
+        let small = device(1 << 27, 1 << 20);
+        let error = check_structures_fit(needed, &small).expect_err("1 MiB is too little");
+        let text = error.to_string();
+        assert!(text.contains("need 2.0 MiB") && text.contains("bvh"), "{text}");
+        check_structures_fit(needed, &device(1 << 27, 2 << 20)).expect("2 MiB is enough");
     }
 
     #[test]

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use super::accel_on;
 use super::stages::Stages;
-use crate::config::{RenderConfig, Totals, TriangleTest};
-use crate::gpu::DeviceSummary;
+use crate::config::{Accel, RenderConfig, Totals, TriangleTest};
+use crate::error::Result;
+use crate::gpu::{DeviceSummary, structure_bytes};
 use crate::layout::Settings;
 use crate::packing::PackedScene;
 use crate::sizes::{Limits, Sizes, clustered_run};
@@ -15,6 +17,8 @@ use crate::stage::BufferId;
 pub struct Memory {
     /// For the scene.
     pub scene: u64,
+    /// Share of acceleration structures in that, at most; 0 unless rays are traced by ray queries.
+    pub structures: u64,
     /// For visible points, photons and the rest of a render.
     pub render: u64,
     /// Share of the caustic photon map in that; 0 if the scene has neither mirrors nor glass.
@@ -24,7 +28,10 @@ pub struct Memory {
 impl Memory {
     /// The initial memory of a render on a device like this. Later the photon buffers are fitted to the photons, of which there
     /// are usually fewer.
-    pub fn of(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary) -> Self {
+    ///
+    /// # Errors
+    /// [`RenderConfig::accel`] is ray queries and the device has none, or it cannot be opened.
+    pub fn of(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary) -> Result<Self> {
         let sizes = Sizes::new(config, limits(device, u32::MAX, scene));
         let stages = Stages {
             config,
@@ -44,14 +51,20 @@ impl Memory {
             let maps = u64::from(sizes.photon_maps);
             sizes.bytes(id).unwrap_or_default() / maps * (maps - 1)
         };
-        Self {
+        let structures = match accel_on(config, device)? {
+            Accel::RayQuery => structure_bytes(device, scene.own_triangles, &scene.instances)?.structures,
+            _ => 0,
+        };
+        let buffers: u64 = scene_buffers(scene, config.triangle_test)
+            .iter()
+            .map(|(_, bytes)| bytes.len() as u64)
+            .sum();
+        Ok(Self {
             caustic_map: of_maps.map(caustic_map).iter().sum(),
-            scene: scene_buffers(scene, config.triangle_test)
-                .iter()
-                .map(|(_, bytes)| bytes.len() as u64)
-                .sum(),
+            scene: buffers + structures,
+            structures,
             render: render + size_of::<Settings>() as u64,
-        }
+        })
     }
 }
 

@@ -7,7 +7,7 @@ mod memory;
 mod radii;
 mod stages;
 
-use fitting::check_fits;
+use fitting::{check_fits, check_structures_fit};
 use iteration::Begun;
 pub use memory::Memory;
 use memory::{bindable_bytes, limits, scene_buffers};
@@ -94,6 +94,10 @@ impl Renderer {
             ..limits(device.summary(), loop_limit, scene)
         };
         check_fits(scene, &config, device.summary(), within(u32::MAX, &device))?;
+        if config.accel == Accel::RayQuery {
+            let structures = device.structure_bytes(scene.own_triangles, &scene.instances)?;
+            check_structures_fit(structures, device.summary())?;
+        }
         let loop_limit = device.loop_limit()?;
         let limits = within(loop_limit, &device);
         let triangles = scene.seen_triangles();

@@ -50,7 +50,10 @@ impl PreparedScene {
     }
 
     /// The device memory that a render takes.
-    pub fn memory(&self, config: &RenderConfig, device: &DeviceSummary) -> Memory {
+    ///
+    /// # Errors
+    /// Rays are to be traced by ray queries and the device has none, or it cannot be opened.
+    pub fn memory(&self, config: &RenderConfig, device: &DeviceSummary) -> Result<Memory> {
         Memory::of(&self.packed, config, device)
     }
 
