@@ -1,5 +1,5 @@
 //! Kernels fit a GPU, according to a compiler: Mesa's RADV compiles them for a card that need not be present. The limits are those
-//! of Debian 12's Mesa, which has no ray queries for that card: `scripts/driver backports-radv` checks the kernels with ray queries.
+//! of Debian 12's Mesa; `scripts/driver backports-radv` checks the kernels with ray queries by a newer one.
 
 use std::env;
 use std::path::Path;
@@ -96,5 +96,7 @@ fn kernels_of_usual_scenes_fit_twelve_times() {
 /// No scene uses all features.
 #[test]
 fn kernels_that_know_everything_fit_eight_times() {
-    assert_fit("all", 8, 8);
+    // Debian 12's Mesa takes 144 registers for `camera` with ray queries, Mesa 25 takes 128.
+    let by_query = if chosen_driver().is_some() { 8 } else { 6 };
+    assert_fit("all", 8, by_query);
 }

@@ -153,11 +153,10 @@ pub(super) fn boxes(
     ranges: &BTreeMap<u32, Range<u32>>,
     instances: &[Instance],
 ) -> Vec<[Vec3; 2]> {
-    let corner = |[x, y, z, _]: [f32; 4]| Vec3::new(x, y, z);
     let mut boxes: Vec<[Vec3; 2]> = triangles
         .iter()
         .map(|triangle| {
-            let [a, b, c] = [triangle.p0, triangle.p1, triangle.p2].map(corner);
+            let [a, b, c] = [triangle.p0, triangle.p1, triangle.p2].map(Vec3::from);
             [a.min(b).min(c), a.max(b).max(c)]
         })
         .collect();
