@@ -6,8 +6,9 @@ use ash::{khr, vk};
 use gpu_allocator::MemoryLocation;
 
 use super::buffer::Buffer;
-use super::context::{Context, DeviceSummary, OrVulkan, VulkanInstance};
+use super::context::{Context, OrVulkan};
 use super::device::Device;
+use super::instance::{DeviceSummary, VulkanInstance};
 use super::structures::{BYTES_OF_BOX, Plan, UNPLACED, barrier_after_builds, boxes, ranges_of, record_of};
 use crate::error::{Error, Remedy, Result, Setting};
 use crate::layout::{Instance, ShadingTriangle};

@@ -383,7 +383,7 @@ fn flux_of_a_smaller_disc_counts_as_that_of_the_whole_one() {
     let mut recording = Recording::new();
     recording.dispatch(
         StageDesc::new(&shaders::UPDATE, 64)
-            .push([1f32])
+            .push(shaders::UpdatePush { photons: 1.0 })
             .bind(vec![(BufferId::SequenceSums, BufferId::Sequence0Sums)]),
     );
     bench.renderer.run(&recording).expect("a run");
