@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 #include "common/random.glsl"
 #include "lights/emission.glsl"
 
-layout(push_constant) uniform Push {
+layout(push_constant) uniform CountPush {
     uint count;
 } push;
 
