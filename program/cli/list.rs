@@ -199,9 +199,19 @@ pub fn inspect(path: &Path, read: &SceneArguments, as_json: bool) -> Result<Stri
     Ok(text)
 }
 
-/// The memory of a render of the first camera on the best device with default settings; `None` without a device.
+/// The memory of a render of the first camera on the best device with default settings; `None` without a device, or, with a
+/// message, if it can't be found out.
 fn memory(scene: &Scene, prepared: &PreparedScene) -> Option<(Memory, RenderConfig)> {
     let config = RenderConfig::of(&scene.cameras[0]);
     let device = best_device().ok()?;
-    Some((prepared.memory(&config, &device).ok()?, config))
+    match prepared.memory(&config, &device) {
+        Ok(memory) => Some((memory, config)),
+        Err(error) => {
+            say!(
+                "warning: the memory of a render is unknown: {}",
+                advice::of_library(&error)
+            );
+            None
+        }
+    }
 }

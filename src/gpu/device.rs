@@ -109,13 +109,18 @@ impl Device {
         Ok(())
     }
 
+    /// Waits until the device is not using anything.
+    pub(super) fn wait_until_idle(&self) {
+        if self.slots.are_busy() {
+            // SAFETY: a plain call. What fails here fails where the work is waited for.
+            let _ = unsafe { self.context.device.device_wait_idle() };
+        }
+    }
+
     /// Frees the memory of the buffer `id`.
     pub(super) fn remove(&mut self, id: BufferId) {
         if let Some(buffer) = self.buffers.remove(&id) {
-            if self.slots.are_busy() {
-                // SAFETY: a plain call. What fails here fails where the work is waited for.
-                let _ = unsafe { self.context.device.device_wait_idle() };
-            }
+            self.wait_until_idle();
             self.descriptors.free(&self.context);
             buffer.free(&self.context);
         }

@@ -1,6 +1,7 @@
 //! Acceleration structures for VK_KHR_ray_query, over the boxes of triangles; see `glsl/trace/ray_query.glsl`.
 
 use std::ffi::CStr;
+use std::ops::Range;
 
 use ash::{khr, vk};
 use gpu_allocator::MemoryLocation;
@@ -25,6 +26,9 @@ pub(super) struct RayTracing {
     pub functions: khr::acceleration_structure::Device,
     pub set_layout: vk::DescriptorSetLayout,
     pub scratch_alignment: u64,
+    /// Limits of one structure.
+    pub max_triangles: u64,
+    pub max_instances: u64,
 }
 
 /// Whether a device with [`EXTENSIONS`] has the features too.
@@ -64,6 +68,8 @@ impl RayTracing {
         Ok(Self {
             functions: khr::acceleration_structure::Device::new(instance, device),
             set_layout: set_layout.or_vulkan("vkCreateDescriptorSetLayout")?,
+            max_triangles: of_structures.max_primitive_count,
+            max_instances: of_structures.max_instance_count,
             scratch_alignment: u64::from(of_structures.min_acceleration_structure_scratch_offset_alignment.max(1)),
         })
     }
@@ -136,21 +142,33 @@ pub(crate) fn structure_bytes(
     let context = Context::new(shared.clone(), physical, false)?;
     let tracing = context.ray_tracing.as_ref();
     let tracing = tracing.ok_or_else(|| no_ray_query(&device.name))?;
-    Ok(StructureBytes::of(tracing, own_triangles, instances))
+    StructureBytes::of(tracing, &device.name, own_triangles, instances)
 }
 
 impl StructureBytes {
-    fn of(tracing: &RayTracing, own_triangles: u32, instances: &[Instance]) -> Self {
+    fn of(tracing: &RayTracing, device: &str, own_triangles: u32, instances: &[Instance]) -> Result<Self> {
         let ranges = ranges_of(own_triangles, instances);
+        let triangles = ranges.values().map(|range| u64::from(range.end - range.start)).max();
+        for (count, most, of) in [
+            (triangles.unwrap_or(0), tracing.max_triangles, "triangles in a mesh"),
+            (instances.len() as u64 + 1, tracing.max_instances, "instances"),
+        ] {
+            if count > most {
+                let what = format!(
+                    "ray-query: device {device} takes {most} {of} at most, not {count}; use bvh or another device"
+                );
+                return Err(Error::setting(Setting::Accel, what));
+            }
+        }
         let boxes = ranges.values().map(|range| u64::from(range.end)).max().unwrap_or(0) * BYTES_OF_BOX;
         let bottom: Vec<Plan<'_>> = ranges.values().map(|range| Plan::boxes(tracing, 0, range)).collect();
         let top = Plan::instances(tracing, 0, instances.len() as u32 + 1);
         let bytes: u64 = bottom.iter().map(|plan| plan.bytes).sum();
         let scratch = bottom.iter().chain([&top]).map(|plan| plan.scratch).max().unwrap_or(0);
-        Self {
+        Ok(Self {
             structures: bytes + top.bytes,
             at_once: bytes.max(top.bytes).max(scratch).max(boxes),
-        }
+        })
     }
 }
 
@@ -158,9 +176,9 @@ impl Device {
     /// The memory for the structures of a scene, see [`Device::trace_through`].
     ///
     /// # Errors
-    /// A device without ray queries.
+    /// A device without ray queries, or with too many triangles or instances for it.
     pub fn structure_bytes(&self, own_triangles: u32, instances: &[Instance]) -> Result<StructureBytes> {
-        Ok(StructureBytes::of(self.ray_tracing()?, own_triangles, instances))
+        StructureBytes::of(self.ray_tracing()?, &self.summary.name, own_triangles, instances)
     }
 
     fn ray_tracing(&self) -> Result<&RayTracing> {
@@ -180,6 +198,7 @@ impl Device {
         instances: &[Instance],
     ) -> Result<()> {
         if let Some(old) = self.acceleration.take() {
+            self.wait_until_idle();
             old.free(&self.context);
         }
         let mut made = Acceleration::default();
@@ -267,8 +286,9 @@ impl Device {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let scratch = addressable(&self.context, "scratch", bytes, MemoryLocation::GpuOnly, usage)?;
         let at = address(&self.context, &scratch);
-        let built = self.run_once(|context, tracing, commands| {
-            for plan in &*plans {
+        let parts = parts_of(plans);
+        let built = self.run_in_parts(parts.len(), |context, tracing, commands, part| {
+            for plan in &plans[parts[part].clone()] {
                 plan.build(context, tracing, commands, at);
             }
         });
@@ -283,7 +303,7 @@ impl Device {
             plan.take(bytes);
         }
         make_structures(&self.context, self.ray_tracing()?, plans, made)?;
-        self.run_once(|context, tracing, commands| {
+        self.run_in_parts(1, |context, tracing, commands, _| {
             for (plan, &from) in plans.iter().zip(&loose) {
                 let copy = vk::CopyAccelerationStructureInfoKHR::default()
                     .src(from)
@@ -302,7 +322,7 @@ impl Device {
         let create = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(count);
         // SAFETY: a plain creation call; destroyed below.
         let pool = unsafe { self.context.device.create_query_pool(&create, None) }.or_vulkan("vkCreateQueryPool")?;
-        let told = self.run_once(|context, tracing, commands| {
+        let told = self.run_in_parts(1, |context, tracing, commands, _| {
             // SAFETY: the command buffer is recording; pool and structures live until it has been waited for.
             unsafe {
                 context.device.cmd_reset_query_pool(commands, pool, 0, count);
@@ -325,16 +345,38 @@ impl Device {
         Ok(bytes)
     }
 
-    /// Runs commands for acceleration structures to their end.
-    fn run_once(&mut self, record: impl Fn(&Context, &RayTracing, vk::CommandBuffer)) -> Result<()> {
+    /// Runs commands for acceleration structures to their end, each part in a submission of its own.
+    fn run_in_parts(
+        &mut self,
+        parts: usize,
+        record: impl Fn(&Context, &RayTracing, vk::CommandBuffer, usize),
+    ) -> Result<()> {
         let slot = self.idle_slot()?;
-        self.submit(slot, 1, |context, commands, _| {
+        self.submit(slot, parts, |context, commands, part| {
             if let Some(tracing) = &context.ray_tracing {
-                record(context, tracing, commands);
+                record(context, tracing, commands, part);
             }
         })?;
         self.wait(slot)
     }
+}
+
+/// Triangles that are built into structures by one submission, unless a single structure has more: devices build ten million a
+/// second and more, and drivers reset those that are busy for seconds.
+const TRIANGLES_AT_ONCE: u32 = 1 << 20;
+
+/// Ranges of structures that are built together.
+fn parts_of(plans: &[Plan<'_>]) -> Vec<Range<usize>> {
+    let (mut parts, mut first, mut triangles) = (Vec::new(), 0, 0_u32);
+    for (index, plan) in plans.iter().enumerate() {
+        if index > first && triangles.saturating_add(plan.count) > TRIANGLES_AT_ONCE {
+            parts.push(first..index);
+            (first, triangles) = (index, 0);
+        }
+        triangles = triangles.saturating_add(plan.count);
+    }
+    parts.push(first..plans.len());
+    parts
 }
 
 /// The error for a device without ray queries.

@@ -20,7 +20,7 @@ pub(super) struct Plan<'a> {
     geometry: vk::AccelerationStructureGeometryKHR<'a>,
     pub ty: vk::AccelerationStructureTypeKHR,
     /// Triangles or instances.
-    count: u32,
+    pub count: u32,
     /// Before it is built: at most.
     pub bytes: u64,
     pub scratch: u64,

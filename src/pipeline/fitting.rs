@@ -7,25 +7,41 @@ use super::memory::scene_buffers;
 use super::stages::Stages;
 use crate::config::{RenderConfig, Totals};
 use crate::error::{Error, Remedy, Result, Setting};
-use crate::gpu::{DeviceSummary, StructureBytes, remedy};
+use crate::gpu::{Device, DeviceSummary, StructureBytes, remedy};
 use crate::packing::PackedScene;
 use crate::record::{Command, Recording};
 use crate::sizes::{Limits, Sizes};
 use crate::stage::{Access, BufferId};
 use crate::text;
 
-/// Reports acceleration structures that do not fit.
-pub(super) fn check_structures_fit(needed: StructureBytes, device: &DeviceSummary) -> Result<()> {
+/// Builds the acceleration structures of a scene.
+///
+/// # Errors
+/// Structures that the device can't build, with the advice to do without them.
+pub(super) fn build_structures(device: &mut Device, scene: &PackedScene) -> Result<()> {
+    let needed = device.structure_bytes(scene.own_triangles, &scene.instances)?;
+    check_structures_fit(needed, device.summary())?;
+    let built = device.trace_through(&scene.shading_triangles, scene.own_triangles, &scene.instances);
+    built.map_err(|error| match error {
+        Error::Unfit { what, .. } => without_ray_queries(&what),
+        other => other,
+    })
+}
+
+fn check_structures_fit(needed: StructureBytes, device: &DeviceSummary) -> Result<()> {
     if needed.at_once <= device.max_allocation_bytes {
         return Ok(());
     }
-    let what = format!(
-        "ray-query: the acceleration structures need {} at once, device {} allocates {} at once at most; use bvh or another device",
+    Err(without_ray_queries(&format!(
+        "the acceleration structures need {} at once, device {} allocates {} at once at most",
         text::bytes(needed.at_once),
         device.name,
         text::bytes(device.max_allocation_bytes)
-    );
-    Err(Error::setting(Setting::Accel, what))
+    )))
+}
+
+fn without_ray_queries(why: &str) -> Error {
+    Error::setting(Setting::Accel, format!("ray-query: {why}; use bvh or another device"))
 }
 
 /// A buffer that exceeds a device's limits.
@@ -71,7 +87,7 @@ fn too_large(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary,
         sizes: &sizes,
         features: scene.features,
     };
-    let of_scene: BTreeMap<BufferId, u64> = scene_buffers(scene, config.triangle_test)
+    let of_scene: BTreeMap<BufferId, u64> = scene_buffers(scene, config)
         .iter()
         .map(|(id, bytes)| (*id, bytes.len() as u64))
         .collect();

@@ -32,6 +32,10 @@ impl Memory {
     /// # Errors
     /// [`RenderConfig::accel`] is ray queries and the device has none, or it cannot be opened.
     pub fn of(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary) -> Result<Self> {
+        let config = &RenderConfig {
+            accel: accel_on(config, device)?,
+            ..config.clone()
+        };
         let sizes = Sizes::new(config, limits(device, u32::MAX, scene));
         let stages = Stages {
             config,
@@ -51,11 +55,11 @@ impl Memory {
             let maps = u64::from(sizes.photon_maps);
             sizes.bytes(id).unwrap_or_default() / maps * (maps - 1)
         };
-        let structures = match accel_on(config, device)? {
+        let structures = match config.accel {
             Accel::RayQuery => structure_bytes(device, scene.own_triangles, &scene.instances)?.structures,
             _ => 0,
         };
-        let buffers: u64 = scene_buffers(scene, config.triangle_test)
+        let buffers: u64 = scene_buffers(scene, config)
             .iter()
             .map(|(_, bytes)| bytes.len() as u64)
             .sum();
@@ -97,14 +101,19 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
     }
 }
 
-/// The buffers of the scene. The paper's precomputed triangles are a placeholder unless its triangle test is used.
-pub(super) fn scene_buffers(scene: &PackedScene, test: TriangleTest) -> [(BufferId, &[u8]); 14] {
-    let havel = match test {
+/// The buffers of the scene. The hierarchy is a placeholder if rays are traced by ray queries, the paper's precomputed triangles
+/// unless its triangle test is used.
+pub(super) fn scene_buffers<'a>(scene: &'a PackedScene, config: &RenderConfig) -> [(BufferId, &'a [u8]); 14] {
+    let havel = match config.triangle_test {
         TriangleTest::Havel => scene.havel_triangles.len(),
         TriangleTest::Watertight => scene.havel_triangles.len().min(1),
     };
+    let records = match config.accel {
+        Accel::RayQuery => scene.bvh.len().min(1),
+        _ => scene.bvh.len(),
+    };
     [
-        (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh)),
+        (BufferId::Bvh, bytemuck::cast_slice(&scene.bvh[..records])),
         (
             BufferId::HavelTriangles,
             bytemuck::cast_slice(&scene.havel_triangles[..havel]),

@@ -7,7 +7,7 @@ mod memory;
 mod radii;
 mod stages;
 
-use fitting::{check_fits, check_structures_fit};
+use fitting::{build_structures, check_fits};
 use iteration::Begun;
 pub use memory::Memory;
 use memory::{bindable_bytes, limits, scene_buffers};
@@ -53,6 +53,8 @@ pub struct Renderer {
     reported: Option<StatusCounters>,
     /// An iteration that was submitted ahead.
     ahead: Option<Begun>,
+    /// Why rays are not traced by ray queries, if they would be by default.
+    without_ray_queries: Option<String>,
     /// Nanoseconds that the last iteration's launches took.
     iteration_ns: f64,
 }
@@ -85,19 +87,26 @@ impl Renderer {
             let what = format!("{}: runs on the CPU only", method.name);
             return Err(Error::setting(Setting::Gather, what));
         }
-        let config = RenderConfig {
+        let is_free = config.accel == Accel::Auto;
+        let mut config = RenderConfig {
             accel: accel_on(&config, device.summary())?,
             ..config
         };
+        let mut without_ray_queries = None;
+        if config.accel == Accel::RayQuery
+            && let Err(error) = build_structures(&mut device, scene)
+        {
+            if !is_free {
+                return Err(error);
+            }
+            config.accel = Accel::Bvh;
+            without_ray_queries = Some(error.to_string());
+        }
         let within = |loop_limit, device: &Device| Limits {
             storage_buffer_bytes: buffer_bytes,
             ..limits(device.summary(), loop_limit, scene)
         };
         check_fits(scene, &config, device.summary(), within(u32::MAX, &device))?;
-        if config.accel == Accel::RayQuery {
-            let structures = device.structure_bytes(scene.own_triangles, &scene.instances)?;
-            check_structures_fit(structures, device.summary())?;
-        }
         let loop_limit = device.loop_limit()?;
         let limits = within(loop_limit, &device);
         let triangles = scene.seen_triangles();
@@ -109,11 +118,8 @@ impl Renderer {
             return Err(Error::setting(Setting::Accel, what));
         }
         let sizes = Sizes::new(&config, limits);
-        for (id, bytes) in scene_buffers(scene, config.triangle_test) {
+        for (id, bytes) in scene_buffers(scene, &config) {
             device.upload(id, bytes)?;
-        }
-        if config.accel == Accel::RayQuery {
-            device.trace_through(&scene.shading_triangles, scene.own_triangles, &scene.instances)?;
         }
         let settings = settings(&config, scene, camera, limits.loop_limit);
         let mut renderer = Self {
@@ -137,6 +143,7 @@ impl Renderer {
             parts_of_methods: vec![1; METHODS.len()],
             reported: None,
             ahead: None,
+            without_ray_queries,
             iteration_ns: f64::INFINITY,
         };
         renderer.upload_settings()?;
@@ -219,6 +226,11 @@ impl Renderer {
     /// Whether photons that no visible point can accept are dropped.
     pub fn drops_unwanted(&self) -> bool {
         self.config.drops_unwanted()
+    }
+
+    /// Why rays are traced by the BVH on a device with ray queries, if they would be traced by those by default.
+    pub fn without_ray_queries(&self) -> Option<&str> {
+        self.without_ray_queries.as_deref()
     }
 
     /// The buffers' sizes.

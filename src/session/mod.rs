@@ -119,7 +119,12 @@ impl Session {
             Platform::Cpu => Renderer::Cpu(Box::new(cpu::Renderer::new(packed, camera, config.clone())?)),
         };
         let backend = renderer.backend();
-        let warnings = Warning::before(&packed.features, &config, backend.photon_maps());
+        let mut warnings = Warning::before(&packed.features, &config, backend.photon_maps());
+        if let Renderer::Device(device) = &renderer
+            && let Some(why) = device.without_ray_queries()
+        {
+            warnings.push(Warning::WithoutRayQueries(why.to_owned()));
+        }
         let estimate = ErrorEstimate::new(&config, of_one_photon(packed, backend, &config));
         Ok(Self {
             renderer,

@@ -10,13 +10,15 @@ use crate::packing::SceneFeatures;
 const TELLING_SHARE: f64 = 0.001;
 
 /// A defect of a picture, as one line. It names no flags of a program: those follow from its kind.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
     /// The paper's estimator keeps the first of all random choices: permanent grain.
     KeptChoices,
     /// Caustics have the radii of other light: a picture of this size has one photon map.
     OneMap,
+    /// Rays are traced by the BVH, because the device can't build the acceleration structures for ray queries.
+    WithoutRayQueries(String),
     /// Paths reached [`RenderConfig::max_depth`].
     Truncated {
         /// Their number.
@@ -91,7 +93,7 @@ impl Warning {
     /// Whether the missing share of the picture is negligible.
     pub fn is_slight(&self) -> bool {
         match self {
-            Self::OneMap => true,
+            Self::OneMap | Self::WithoutRayQueries(_) => true,
             // About the same share of light continues at each bounce, so the truncated paths would carry about as much light as
             // all paths at the start. So their share of the paths, as if all were photon paths, is their share of the light.
             Self::Truncated { paths, emitted, .. } => share(*paths, *emitted) < TELLING_SHARE,
@@ -103,6 +105,7 @@ impl Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
+            Self::WithoutRayQueries(ref why) => write!(text, "rays are traced by the BVH instead of ray queries: {why}"),
             Self::KeptChoices => text.write_str(
                 "the estimator ppm finds visible points once: where a wavelength, alpha, a coat, a lobe or a point of a lamp \
                  is chosen at random, each pixel keeps its first choice, and the picture remains grainy there",
