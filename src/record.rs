@@ -61,6 +61,13 @@ impl Recording {
 
     /// Launches a stage; one without invocations is left out.
     pub fn dispatch(&mut self, stage: StageDesc) {
+        let expected = stage.shader.push_constants.map_or(0, |block| block.size());
+        assert_eq!(
+            stage.push.len(),
+            expected,
+            "bytes of push constants of {}",
+            stage.shader.name
+        );
         if stage.threads > 0 {
             self.push(Command::Dispatch(stage));
         }

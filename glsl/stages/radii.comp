@@ -28,11 +28,11 @@ void main() {
         float footprint = footprints[slot];
         if (radius2 == 0.0) {
             float first = settings.first_footprints[map] * footprint;
-            radius2 = settings.initial_radius2 > 0.0 ? settings.initial_radius2 : max(first * first, 1e-24);
+            radius2 = settings.initial_radius2 > 0.0 ? settings.initial_radius2 : max(first * first, SMALLEST_RADIUS2);
             statistics[i].radius2_high = radius2;
         }
         float most = settings.most_footprints[map] * footprint;
-        radius2 = most > 0.0 ? min(radius2, max(most * most, 1e-24)) : radius2;
+        radius2 = most > 0.0 ? min(radius2, max(most * most, SMALLEST_RADIUS2)) : radius2;
     }
     radii2[i] = radius2;
 }

@@ -41,8 +41,8 @@ use crate::layout::{
 };
 use crate::scene::{Alpha, Environment, SHARED, Scene, area};
 
-/// Sources of light of which each is asked by a ray of its own; of more one is chosen.
-const ASKED_ALL: usize = 4;
+/// Maximum number of light sources of which each has a ray of its own at a visible point; of more, one is sampled.
+const SAMPLED_ALL: usize = 4;
 
 const COARSE_LIGHTS: &str = "textures of lamps have too many texels for a light each: the picture is correct, but if single \
                              texels emit, light is sampled by areas of several texels, which is noisier";
@@ -157,8 +157,8 @@ impl PackedScene {
         let mut features = SceneFeatures::of(&shading_triangles, &materials, &light_table.lights);
         features.instanced = !instances.is_empty();
         features.nested = nesting.overlaps;
-        features.few_sources = (2..=ASKED_ALL).contains(&light_table.sources.len());
-        features.many_sources = light_table.sources.len() > ASKED_ALL;
+        features.few_sources = (2..=SAMPLED_ALL).contains(&light_table.sources.len());
+        features.many_sources = light_table.sources.len() > SAMPLED_ALL;
         features.coincident_faces |= features.coincident_interfaces || coincident.doubled;
         // Where a solid has no thickness, it is a thin wall.
         features.thin_walls |= features.coincident_interfaces && coincident.doubled;

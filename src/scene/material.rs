@@ -289,7 +289,7 @@ macro_rules! material_features {
             /// Boundaries of dielectrics.
             dielectric: "DIELECTRICS" = |it| it.is_dielectric(),
             /// Microfacets over a base.
-            glossy: "GLOSSY" = |it| it.surface == $crate::layout::GLOSSY_SURFACE || it.is_mixed() || it.coat > 0.0,
+            glossy: "GLOSSY" = |it| it.is_layered() || it.coat > 0.0,
             /// Microfacets of dielectrics.
             rough_glass: "ROUGH_GLASS" = |it| it.is_dielectric() && it.roughness > 0.0,
             /// Dielectrics without an inside.
@@ -305,9 +305,9 @@ macro_rules! material_features {
             /// Clear coats.
             coat: "CLEARCOAT" = |it| it.coat > 0.0,
             /// Sheens.
-            sheen: "SHEEN" = |it| it.sheen_color != [0.0; 3],
+            sheen: "SHEEN" = |it| it.is_layered() && it.sheen_color != [0.0; 3],
             /// Microfacets whose highlights are longer in one direction.
-            anisotropic: "ANISOTROPY" = |it| it.anisotropy > 0.0,
+            anisotropic: "ANISOTROPY" = |it| it.is_layered() && it.anisotropy > 0.0,
             /// Surfaces whose back no camera sees.
             culling: "CULLING" = |it| it.flags & $crate::layout::BACK_HIDDEN != 0,
             $($rest)*
@@ -319,6 +319,11 @@ pub(crate) use material_features;
 impl layout::Material {
     pub(crate) fn is_dielectric(&self) -> bool {
         self.surface == DIELECTRIC
+    }
+
+    /// Whether a part of it is microfacets over a base, which can have layers.
+    pub(crate) fn is_layered(&self) -> bool {
+        self.surface == GLOSSY_SURFACE || self.is_mixed()
     }
 
     /// Whether it passes a part of the light only, at least somewhere: a texture makes less of the factor.

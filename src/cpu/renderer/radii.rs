@@ -4,7 +4,7 @@ use bytemuck::Zeroable;
 
 use super::{BATCH, Renderer};
 use crate::error::Result;
-use crate::layout;
+use crate::layout::{self, SMALLEST_RADIUS2};
 use crate::radius::{self, LEAST_FOOTPRINTS};
 use crate::random::CameraTurn;
 
@@ -69,13 +69,13 @@ impl Renderer {
                 if *radius2 == 0.0 {
                     let first = f64::from(settings.first_footprints[0]) * point.footprint;
                     *radius2 = match settings.initial_radius2 {
-                        0.0 => first.powi(2).max(1e-24),
+                        0.0 => first.powi(2).max(SMALLEST_RADIUS2),
                         given => given.into(),
                     };
                 }
                 let most = f64::from(settings.most_footprints[0]) * point.footprint;
                 slot.disc = if most > 0.0 {
-                    radius2.min((most * most).max(1e-24))
+                    radius2.min((most * most).max(SMALLEST_RADIUS2))
                 } else {
                     *radius2
                 };
