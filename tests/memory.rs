@@ -35,14 +35,14 @@ fn a_render_takes_the_predicted_memory() {
             estimator,
             ..small(160, 20_000)
         };
-        let foretold = Memory::of(&subject.packed, &config, &device).expect("a device");
+        let predicted = Memory::of(&subject.packed, &config, &device).expect("a device");
         let mut renderer = subject.renderer(config);
         let at_first = renderer.gpu().bytes();
         for _ in 0..4 {
             renderer.iterate().expect("iteration");
         }
         let later = renderer.gpu().bytes();
-        let total = foretold.scene + foretold.render;
+        let total = predicted.scene + predicted.render;
         println!("{name}: predicted {total}, at first {at_first}, later {later}");
         let ratio = at_first as f64 / total as f64;
         assert!(
@@ -93,7 +93,7 @@ fn a_thousand_instances_of_a_mesh_take_hardly_more_memory_than_one_node() {
 }
 
 #[test]
-fn acceleration_structures_take_at_most_what_was_foretold() {
+fn acceleration_structures_take_at_most_the_predicted_memory() {
     let device = best_device().expect("a Vulkan device");
     if !device.ray_query {
         println!("skipped: {} has no ray queries (VK_KHR_ray_query)", device.name);
@@ -108,7 +108,7 @@ fn acceleration_structures_take_at_most_what_was_foretold() {
             accel: Accel::RayQuery,
             ..small(32, 1000)
         };
-        let foretold = Memory::of(&subject.packed, &config, &device).expect("a device");
+        let predicted = Memory::of(&subject.packed, &config, &device).expect("a device");
         let by_bvh = RenderConfig {
             accel: Accel::Bvh,
             ..config.clone()
@@ -117,17 +117,17 @@ fn acceleration_structures_take_at_most_what_was_foretold() {
         let mut renderer = subject.renderer(config);
         let built = renderer.gpu().built_bytes();
         println!(
-            "{name}: {} triangles, {} instances: {built} bytes, foretold {}",
+            "{name}: {} triangles, {} instances: {built} bytes, predicted {}",
             subject.packed.shading_triangles.len(),
             subject.packed.instances.len(),
-            foretold.structures
+            predicted.structures
         );
         assert_eq!(without.structures, 0, "{name}");
-        assert_eq!(foretold.scene, without.scene + foretold.structures, "{name}");
+        assert_eq!(predicted.scene, without.scene + predicted.structures, "{name}");
         assert!(
-            (1..=foretold.structures).contains(&built),
-            "{name}: {built} bytes, foretold at most {}",
-            foretold.structures
+            (1..=predicted.structures).contains(&built),
+            "{name}: {built} bytes, predicted at most {}",
+            predicted.structures
         );
     }
 }
