@@ -1,8 +1,8 @@
 //! The interface of progressive renderers, on a device or on the CPU.
 
-use crate::config::RenderConfig;
 #[cfg(doc)]
 use crate::config::SEQUENCES;
+use crate::config::{RenderConfig, Totals};
 use crate::error::Result;
 use crate::film::Image;
 use crate::layout::{BehindGlass, Settings};
@@ -11,6 +11,7 @@ use crate::packing::PackedScene;
 use crate::radius::{MOST_FOOTPRINTS, PILOT_FOOTPRINTS};
 use crate::record::Run;
 use crate::scene::{Camera, Lens, Projection};
+use crate::state::Blocks;
 
 /// A progressive render.
 pub trait Backend {
@@ -48,10 +49,26 @@ pub trait Backend {
     fn resolve(&mut self) -> Result<Image> {
         self.resolve_all().map(|resolved| resolved.image)
     }
+    /// What it has learned: another renderer of the same scene with the same settings can go on with it.
+    ///
+    /// # Errors
+    /// Whatever the device can't do.
+    fn save(&mut self) -> Result<Blocks>;
+    /// Goes on from what another renderer has learned: further iterations have the same bits as that one's on the same device.
+    ///
+    /// # Errors
+    /// Blocks of another kind of renderer or picture; whatever the device can't do.
+    fn restore(&mut self, learned: &Blocks) -> Result<()>;
+    /// Totals of all iterations.
+    fn totals(&self) -> Totals;
     /// Iterations done.
-    fn iterations(&self) -> u32;
+    fn iterations(&self) -> u32 {
+        self.totals().iterations
+    }
     /// Photon paths emitted in all iterations.
-    fn emitted(&self) -> u64;
+    fn emitted(&self) -> u64 {
+        self.totals().emitted
+    }
     /// Counters of the render.
     fn counters(&self) -> Counters;
     /// The median of the initial radii of global photons, render units.
@@ -102,7 +119,7 @@ impl Resolved {
 }
 
 /// The device of a render, for reports.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DeviceDescription {
     /// Name.
     pub name: String,
@@ -113,7 +130,7 @@ pub struct DeviceDescription {
 }
 
 /// Counters of a render.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
     /// Photons that landed on surfaces that can have visible points, in all iterations.
     pub photons_landed: u64,
@@ -136,6 +153,31 @@ pub struct Counters {
 }
 
 impl Counters {
+    /// Adds those of another part of a render.
+    pub fn add(&mut self, other: &Self) {
+        // Every field: one that is added has to be added up here.
+        let Self {
+            photons_landed,
+            photons_stored,
+            photons_accepted,
+            truncated_paths,
+            cut_paths,
+            non_finite,
+            lost_photons,
+            full_cells,
+            repeated_iterations,
+        } = other;
+        self.photons_landed += photons_landed;
+        self.photons_stored += photons_stored;
+        self.photons_accepted += photons_accepted;
+        self.truncated_paths += truncated_paths;
+        self.cut_paths += cut_paths;
+        self.non_finite += non_finite;
+        self.lost_photons += lost_photons;
+        self.full_cells += full_cells;
+        self.repeated_iterations += repeated_iterations;
+    }
+
     /// A summary of the photons, as text.
     pub fn photons(&self) -> String {
         let Self {
@@ -187,7 +229,7 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         camera_forward: with(forward, 0.0),
         resolution: config.resolution,
         slots_per_pixel: 1,
-        seed: config.seed,
+        seed: config.random_seed(),
         light_count: scene.lights.len() as u32,
         instance_count: scene.instances.len() as u32,
         max_depth: config.max_depth,
@@ -198,7 +240,8 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         cell_bits: 0,
         alpha: config.alpha,
         initial_radius2: config.radius.map_or(0.0, |radius| {
-            (radius * scene.scale).clamp(SMALLEST_RADIUS, LARGEST_RADIUS).powi(2) as f32
+            let radius2 = (radius * scene.scale).clamp(SMALLEST_RADIUS, LARGEST_RADIUS).powi(2) as f32;
+            radius2 * config.part.radius2_factor(config.alpha)
         }),
         loop_limit,
         bsdf_sampling: scene.bsdf_sampling,

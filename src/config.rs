@@ -1,16 +1,19 @@
 //! Settings of a render.
 
 mod choice;
+mod part;
 pub mod ranges;
 mod tiles;
 
 pub use choice::Choice;
 pub(crate) use choice::choices;
+pub use part::Part;
 pub use tiles::pixel_of;
 
 use std::fmt::Display;
 
 use ranges::Checked;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result, Setting};
 pub use crate::layout::SEQUENCES;
@@ -138,6 +141,8 @@ pub struct RenderConfig {
     pub sampler: Sampler,
     /// Seed of all random numbers.
     pub seed: u32,
+    /// Which of several independent parts it renders.
+    pub part: Part,
 }
 
 impl Default for RenderConfig {
@@ -152,6 +157,26 @@ pub const MAX_SIDE: u32 = 16384;
 /// Number of the first `iterations` iterations that belong to a sequence.
 pub fn iterations_of(sequence: u32, iterations: u32) -> u32 {
     iterations / SEQUENCES + u32::from(sequence < iterations % SEQUENCES)
+}
+
+/// The iterations of each of [`SEQUENCES`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SequenceIterations(pub [u32; SEQUENCES as usize]);
+
+impl From<u32> for SequenceIterations {
+    /// Those of a render of this number of iterations.
+    fn from(iterations: u32) -> Self {
+        Self(std::array::from_fn(|sequence| {
+            iterations_of(sequence as u32, iterations)
+        }))
+    }
+}
+
+impl SequenceIterations {
+    /// Of all sequences.
+    pub fn total(self) -> f64 {
+        self.0.into_iter().map(f64::from).sum()
+    }
 }
 
 /// Maximum number of camera paths of a pixel in an iteration: that many are cheap compared with the photon paths.
@@ -183,6 +208,7 @@ impl RenderConfig {
         aims_anyway: false,
         sampler: Sampler::of(Estimator::Sppm),
         seed: 0,
+        part: Part::WHOLE,
     };
 
     /// Checks every range.
@@ -199,6 +225,7 @@ impl RenderConfig {
         in_range(Setting::Alpha, self.alpha, ranges::alpha(self.alpha))?;
         in_range(Setting::Photons, self.photons, ranges::count(self.photons))?;
         in_range(Setting::MaxDepth, self.max_depth, ranges::count(self.max_depth))?;
+        in_range(Setting::Part, self.part, ranges::part(self.part))?;
         if let Some(radius) = self.radius {
             in_range(Setting::Radius, radius, ranges::positive(radius))?;
         }
@@ -206,6 +233,11 @@ impl RenderConfig {
             in_range(Setting::CellPhotons, count, ranges::count(count))?;
         }
         Ok(())
+    }
+
+    /// Seed of the kernels' random numbers: each part has its own.
+    pub fn random_seed(&self) -> u32 {
+        self.part.seed(self.seed)
     }
 
     /// Whether photons that no visible point can accept are dropped where they land. The paper keeps all photons.
@@ -260,7 +292,7 @@ impl RenderConfig {
 }
 
 /// Totals of a render.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Totals {
     /// Iterations.
     pub iterations: u32,

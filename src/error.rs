@@ -81,6 +81,8 @@ pub enum Setting {
     Alpha,
     /// The initial radius.
     Radius,
+    /// A part of several.
+    Part,
     /// Bounces of a path.
     MaxDepth,
     /// Photons of a grid cell.
@@ -102,6 +104,7 @@ impl fmt::Display for Setting {
             Self::Photons => "photons",
             Self::Alpha => "alpha",
             Self::Radius => "radius",
+            Self::Part => "part",
             Self::MaxDepth => "max_depth",
             Self::CellPhotons => "cell_photons",
             Self::Gather => "gather",
@@ -159,6 +162,11 @@ impl fmt::Display for Remedy {
 }
 
 impl Error {
+    /// Whether the device was lost: after a driver's reset, another one may be opened.
+    pub fn is_device_lost(&self) -> bool {
+        matches!(self, Self::Vulkan { code, .. } if code.contains("DEVICE_LOST"))
+    }
+
     /// A device whose limits are exceeded.
     pub(crate) fn unfit(what: impl Into<String>, remedy: Remedy) -> Self {
         Self::Unfit {

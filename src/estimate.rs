@@ -14,12 +14,12 @@ mod parts;
 mod spread;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::backend::{Backend, Resolved};
-use crate::config::{Estimator, RenderConfig, SEQUENCES};
+use crate::config::{Estimator, RenderConfig, SEQUENCES, SequenceIterations};
 use crate::film::Image;
 use crate::metrics::floor_of;
-use crate::packing::PackedScene;
 use parts::{OfPixel, Parts};
 use spread::{Spread, Weights};
 
@@ -31,7 +31,7 @@ const BIAS_PER_CURVATURE: f64 = 3.4;
 const NOTABLE: f64 = 0.2;
 
 /// The estimator of the error of a render's pictures.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct ErrorEstimate {
     /// Whether pixels are sampled at their centres only.
     sees_centres: bool,
@@ -86,7 +86,7 @@ fn own_part(curvature: &Spread, channels: &[Spread; 3]) -> f64 {
 
 /// The radiance of a white surface by one photon in one iteration. A pixel without photons might as well have received one: that
 /// contribution is its standard error.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct OnePhoton {
     /// Radiance.
     pub radiance: f64,
@@ -94,14 +94,14 @@ pub struct OnePhoton {
     pub radius2: f64,
 }
 
-/// For a photon of the pilots' average flux, or of the lights' average power, at the median of the initial radii.
-pub fn of_one_photon(scene: &PackedScene, backend: &dyn Backend, config: &RenderConfig) -> OnePhoton {
+/// For a photon of the pilots' average flux, or of the lights' total `power`, at the median of the initial radii.
+pub fn of_one_photon(power: f64, backend: &dyn Backend, config: &RenderConfig) -> OnePhoton {
     let radius2 = f64::from(backend.radius()).powi(2);
     if radius2 == 0.0 {
         // No surface is visible.
         return OnePhoton::default();
     }
-    let flux = backend.photon_flux().unwrap_or(scene.power);
+    let flux = backend.photon_flux().unwrap_or(power);
     OnePhoton {
         radiance: flux / f64::from(config.photons) / (std::f64::consts::PI.powi(2) * radius2),
         radius2,
@@ -125,9 +125,9 @@ impl ErrorEstimate {
 
     /// The squared errors of the picture after `iterations` iterations; `None` before each sequence has had one, and while the
     /// picture is black.
-    fn parts(&self, iterations: u32, picture: &Resolved) -> Option<Parts> {
+    fn parts(&self, iterations: SequenceIterations, picture: &Resolved) -> Option<Parts> {
         let floor = floor_of(&picture.image);
-        if iterations < SEQUENCES || floor <= 0.0 {
+        if iterations.0.contains(&0) || floor <= 0.0 {
             return None;
         }
         let weights = Weights::of(iterations);
@@ -140,7 +140,7 @@ impl ErrorEstimate {
             let values = picture.image.pixels().iter().map(|pixel| f64::from(pixel[channel]));
             parts::sums_around(&values.collect::<Vec<_>>(), width)
         });
-        let photon = self.photon.radiance / f64::from(iterations);
+        let photon = self.photon.radiance / iterations.total();
         let of_pixel = |pixel: usize| {
             let curvature = spread_of(pixel, 3);
             let without_photons = picture.waits[pixel];
@@ -178,8 +178,8 @@ impl ErrorEstimate {
     }
 
     /// The error of the picture after `iterations` iterations; `None` before there are enough, and while it is black.
-    pub fn relative(&self, iterations: u32, picture: &Resolved) -> Option<RelativeError> {
-        let parts = self.parts(iterations, picture)?;
+    pub fn relative(&self, iterations: impl Into<SequenceIterations>, picture: &Resolved) -> Option<RelativeError> {
+        let parts = self.parts(iterations.into(), picture)?;
         let noise2 = parts.relative_noise2();
         let [bias2, aliasing2] = [parts.relative_bias2(), parts.relative_aliasing2()].map(|part| part.max(0.0));
         let missing2 = parts.relative_missing2();
@@ -201,8 +201,8 @@ impl ErrorEstimate {
 
     /// The error of each pixel, root of the mean square, in units of radiance; `None` as in [`ErrorEstimate::relative`], whose
     /// error they add up to. A pixel's bias is that of the pixels around it: its own estimate is dominated by noise.
-    pub fn of_pixels(&self, iterations: u32, picture: &Resolved) -> Option<Image> {
-        let parts = self.parts(iterations, picture)?;
+    pub fn of_pixels(&self, iterations: impl Into<SequenceIterations>, picture: &Resolved) -> Option<Image> {
+        let parts = self.parts(iterations.into(), picture)?;
         let errors = parts
             .of_pixels()
             .into_iter()

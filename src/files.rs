@@ -76,6 +76,14 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// # Errors
 /// As [`check_writable`]; further if the disk is full.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_whole_by(path, |file| file.write_all(bytes))
+}
+
+/// The same for what `write` writes.
+///
+/// # Errors
+/// As [`write_whole`].
+pub fn write_whole_by(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
     let failed = |error: io::Error| {
         Error::file(
             path,
@@ -84,7 +92,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     };
     let _writing = Writing::begin();
     let mut temporary = temporary_beside(path)?;
-    temporary.write_all(bytes).map_err(failed)?;
+    write(temporary.as_file_mut()).map_err(failed)?;
     // Otherwise a power failure soon after the renaming could leave an empty file.
     temporary.as_file().sync_all().map_err(failed)?;
     temporary.persist(path).map_err(|error| failed(error.error))?;

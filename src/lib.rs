@@ -76,10 +76,11 @@ mod session;
 mod shaders;
 mod sizes;
 mod stage;
+mod state;
 mod text;
 
 pub use backend::{Counters, DeviceDescription};
-pub use config::{Accel, Choice, Direct, EmissionChoice, Estimator, RenderConfig, Sampler, TriangleTest};
+pub use config::{Accel, Choice, Direct, EmissionChoice, Estimator, Part, RenderConfig, Sampler, TriangleTest};
 pub use error::{Error, Remedy, Result, Setting};
 pub use estimate::RelativeError;
 pub use film::{Image, read_exr};
@@ -90,4 +91,7 @@ pub use pipeline::Memory;
 pub use record::Run;
 pub use report::{Profile, Subject};
 pub use scene::{Camera, Environment, Lens, LoadChoice, Remark, Scene};
-pub use session::{Failure, Hooks, Platform, PreparedScene, Progress, Rendered, Session, Until, Warning};
+pub use session::{
+    Failure, Hooks, Merge, Platform, PreparedScene, Progress, Rendered, Session, Snapshot, Snapshots, State, Until,
+    Warning,
+};

@@ -2,7 +2,7 @@
 
 mod sobol;
 
-use crate::config::{RenderConfig, SEQUENCES, Sampler};
+use crate::config::{Estimator, RenderConfig, SEQUENCES, Sampler, Totals};
 use crate::layout::{CAMERA_PATH, COVERAGE_SAMPLE, LIGHT_SAMPLE, PHOTON_PATH};
 use crate::shaders;
 
@@ -51,6 +51,21 @@ impl CameraTurn {
     /// The other paths of its iteration.
     pub fn others(self) -> impl Iterator<Item = Self> {
         (1..self.paths).map(move |path| Self { path, ..self })
+    }
+
+    /// The last path of a render so far, whose visible points are still there; `None` before the first iteration. The paper's
+    /// estimator has those of its first iteration.
+    pub fn last(config: &RenderConfig, totals: Totals) -> Option<Self> {
+        let last = totals.iterations.checked_sub(1)?;
+        let iteration = match config.estimator {
+            Estimator::Sppm => last,
+            Estimator::Ppm => 0,
+        };
+        let gathers = Self::that_gathers(config, iteration);
+        // A first iteration that was interrupted has one path only.
+        let was_interrupted = last == 0 && totals.camera_paths == 1;
+        let others = gathers.others().filter(|_| !was_interrupted);
+        Some(others.last().unwrap_or(gathers))
     }
 }
 
@@ -117,7 +132,7 @@ impl Random {
                 kind,
                 pixel,
                 iteration.wrapping_mul(paths).wrapping_add(path),
-                config.seed,
+                config.random_seed(),
             )
         }
     }
@@ -133,7 +148,13 @@ impl Random {
             sequence: slot,
             block,
             index,
-            ..Self::with(config.sampler, PathKind::Coverage, slot, iteration, config.seed)
+            ..Self::with(
+                config.sampler,
+                PathKind::Coverage,
+                slot,
+                iteration,
+                config.random_seed(),
+            )
         }
     }
 
@@ -159,7 +180,7 @@ impl Random {
             sequence: iteration % SEQUENCES,
             block: config.block_of(iteration),
             index: config.first_of_sequence(iteration).wrapping_add(path),
-            ..Self::with(config.sampler, PathKind::Photon, path, iteration, config.seed)
+            ..Self::with(config.sampler, PathKind::Photon, path, iteration, config.random_seed())
         }
     }
 

@@ -1,5 +1,7 @@
 //! Buffer sizes and group counts, and the numbers that determine them.
 
+use serde::{Deserialize, Serialize};
+
 use crate::config::{EmissionChoice, Estimator, RenderConfig};
 use crate::layout::{
     BehindGlass, Centroid, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, GridShape, PathStart,
@@ -36,7 +38,7 @@ const EMISSION_TABLE_BYTES: usize =
     16 * (1 + MOST_TARGETS as usize) + MOST_EMISSION_CELLS as usize * size_of::<EmissionCell>();
 
 /// Sizes of a render's buffers, in elements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sizes {
     /// Pixels, width and height.
     pub resolution: [u32; 2],
@@ -75,7 +77,7 @@ pub struct Sizes {
 }
 
 /// Options of benches for gathers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Probe {
     /// Gathers that test every photon process every stride-th workgroup of visible points.
     pub stride: u32,

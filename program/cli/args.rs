@@ -9,11 +9,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::bench::{BenchFeatures, BenchGather, BenchKernels, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
+use super::merge::MergeArguments;
 use super::outputs::named;
 use super::scene::SceneArguments;
 use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
-use ppm_vk::{Accel, Choice, Direct, EmissionChoice, Estimator, RenderConfig, Sampler, TriangleTest};
+use ppm_vk::{Accel, Choice, Direct, EmissionChoice, Estimator, Part, RenderConfig, Sampler, TriangleTest};
 
 /// Maximum shift of the film, in units of the picture's larger side.
 const FARTHEST_SHIFT: f32 = 1000.0;
@@ -51,6 +52,8 @@ pub enum Command {
     Converge(Box<ConvergeArguments>),
     /// Compare a picture with a reference.
     Compare(Compare),
+    /// Merge the states of parts (--part K/N --state FILE) into a picture.
+    Merge(MergeArguments),
     /// Show the contents of a scene.
     Inspect {
         /// glTF file (.gltf or .glb).
@@ -183,6 +186,20 @@ pub struct RenderArguments {
     /// Write every launch as a Chrome or Perfetto trace (JSON).
     #[arg(long, value_name = "FILE", value_parser = named("json"))]
     pub trace: Option<PathBuf>,
+    /// Keep what the render has learned in this file, to go on from it with --resume.
+    #[arg(long, value_name = "FILE", value_parser = named("state"))]
+    pub state: Option<PathBuf>,
+    /// Write the picture so far, and the state, whenever this time has passed [default: 60 with --state].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
+    pub save_every: Option<Duration>,
+    /// Go on from --state: the picture has the same bits as without the interruption. --iterations counts those of the state
+    /// too.
+    #[arg(long, requires = "state")]
+    pub resume: bool,
+    /// Render the K-th of N independent parts, for ppm-vk merge: N parts of n iterations have the noise and the radii of one
+    /// render of N·n. Needs --state.
+    #[arg(long, value_name = "K/N", requires = "state", default_value_t = Part::WHOLE, hide_default_value = true, value_parser = part)]
+    pub part: Part,
     /// No progress bar.
     #[arg(long)]
     pub quiet: bool,
@@ -210,6 +227,14 @@ pub fn resolution(text: &str) -> Result<[u32; 2], String> {
 pub fn count(text: &str) -> Result<u32, String> {
     let whole = |_| format!("expected a whole number up to {}", u32::MAX);
     ranges::count(text.parse().map_err(whole)?)
+}
+
+fn part(text: &str) -> Result<Part, String> {
+    let parsed = text
+        .split_once('/')
+        .and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
+    let (number, of) = parsed.ok_or("expected K/N, such as 1/4")?;
+    ranges::part(Part { number, of })
 }
 
 fn shift(text: &str) -> Result<[f32; 2], String> {
@@ -245,7 +270,7 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 /// A file name whose ending fits the format.
-fn exr_file(name: &str) -> Result<PathBuf, String> {
+pub fn exr_file(name: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(name);
     match path.extension() {
         Some(extension) if extension.eq_ignore_ascii_case("exr") => Ok(path),
@@ -262,7 +287,7 @@ pub fn png_file(name: &str) -> Result<PathBuf, String> {
     }
 }
 
-fn exposure(text: &str) -> Result<f32, String> {
+pub fn exposure(text: &str) -> Result<f32, String> {
     let stops = number(text)? as f32;
     if stops.abs() <= 100.0 {
         Ok(stops)

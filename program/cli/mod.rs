@@ -17,9 +17,11 @@ mod compare;
 mod converge;
 mod interrupt;
 mod list;
+mod merge;
 mod outputs;
 mod progress;
 mod render;
+mod save;
 mod scene;
 
 use std::io::Write as _;
@@ -55,6 +57,7 @@ pub fn run() -> Result<Outcome> {
         Some(Command::Bench(args::Bench::Kernels(arguments))) => bench::kernels(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Converge(arguments)) => converge::run(&arguments),
+        Some(Command::Merge(arguments)) => merge::run(&arguments),
         Some(Command::Gathers) => print(&list::gathers()?),
         Some(Command::Inspect { scene, read, json }) => print(&list::inspect(&scene, &read, json)?),
     }

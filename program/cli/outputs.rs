@@ -91,8 +91,8 @@ pub fn all(written: impl IntoIterator<Item = Result<()>>) -> Result<()> {
 }
 
 /// Formats by file name endings.
-const ENDINGS: [&str; 12] = [
-    "exr", "hdr", "png", "jpg", "jpeg", "webp", "svg", "json", "csv", "gltf", "glb", "bin",
+const ENDINGS: [&str; 13] = [
+    "exr", "hdr", "png", "jpg", "jpeg", "webp", "svg", "json", "csv", "gltf", "glb", "bin", "state",
 ];
 
 /// A parser of file names for one format: names with the ending of another format are refused.

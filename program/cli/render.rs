@@ -11,13 +11,14 @@ use ppm_vk::internals::files::Writing;
 use ppm_vk::internals::film;
 use ppm_vk::internals::gather::{self, METHODS, Runs};
 use ppm_vk::{
-    Camera, EmissionChoice, Estimator, Hooks, Platform, PreparedScene, RenderConfig, Rendered, Sampler, Session, Until,
-    Warning,
+    Camera, EmissionChoice, Estimator, Hooks, Platform, PreparedScene, RenderConfig, Rendered, Sampler, Session, State,
+    Until, Warning,
 };
 
 use super::args::{Arguments, BackendChoice, RenderArguments};
 use super::outputs::{all, check_outputs};
 use super::progress::{BUILDING, Bar, while_showing, with_prefix};
+use super::save::Saver;
 use super::scene::say_remarks;
 use super::{Outcome, advice, interrupt};
 
@@ -51,8 +52,12 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     for note in prepared.notes() {
         say!("note: {note}");
     }
-    let mut session = Session::new(&prepared, &camera, &config, &platform)?;
+    let open = || Session::new(&prepared, &camera, &config, &platform);
+    let mut session = open()?;
     say_warnings(session.warnings());
+    if let Some(state) = &arguments.state {
+        begin_with_state(&mut session, state, arguments.resume)?;
+    }
     if arguments.radius.is_none() {
         say!("initial radius {:.6} scene units (automatic)", session.radius());
     }
@@ -68,22 +73,65 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         time: arguments.time,
         error: arguments.target_error,
     };
+    let saver = Saver::new(arguments, &output);
+    let save = |snapshot| {
+        if let Some(saver) = &saver {
+            saver.save(snapshot);
+        }
+    };
     let bar = Bar::new(until, quiet);
     let hooks = Hooks {
         stop: &interrupt::requested,
         progress: &|progress| bar.show(progress),
         profile: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
+        snapshots: saver.as_ref().map(|saver| saver.snapshots(&save)),
     };
-    let rendered = session.render_with(until, &hooks);
+    let mut rendered = session.render_with(until, &hooks);
+    if let Some(state) = arguments.state.as_deref().filter(|_| is_device_lost(&rendered)) {
+        say!(
+            "warning: the device was lost; the render goes on from {} on a device that is opened anew",
+            state.display()
+        );
+        session = open()?;
+        session.resume(&State::read(state)?)?;
+        rendered = session.render_with(until, &hooks);
+    }
     bar.finish();
+    drop(hooks);
+    if let Some(saver) = saver {
+        saver.finish();
+    }
     let rendered = rendered?;
     say_warnings(&rendered.warnings());
-    write_outputs(arguments, &output, &rendered)?;
+    let state = arguments.state.as_ref().filter(|_| rendered.failure().is_none());
+    let state = state.map(|file| Ok(session.state()?.write(file)?));
+    all([write_outputs(arguments, &output, &rendered)].into_iter().chain(state))?;
     Ok(if interrupt::requested() {
         Outcome::Interrupted
     } else {
         Outcome::Done
     })
+}
+
+/// Goes on from a state, if that is asked for and there is one.
+fn begin_with_state(session: &mut Session, file: &Path, resume: bool) -> Result<()> {
+    if !file.exists() {
+        if resume {
+            say!("note: there is no {} yet: the render begins", file.display());
+        }
+    } else if resume {
+        let state = State::read(file)?;
+        session.resume(&state).with_context(|| file.display().to_string())?;
+        say!("{}: going on after {} iterations", file.display(), session.iterations());
+    } else {
+        say!("note: {} will be replaced; --resume goes on from it", file.display());
+    }
+    Ok(())
+}
+
+fn is_device_lost(rendered: &ppm_vk::Result<Rendered>) -> bool {
+    let failure = |rendered: &Rendered| rendered.failure().is_some_and(|failure| failure.error.is_device_lost());
+    rendered.as_ref().map_or_else(ppm_vk::Error::is_device_lost, failure)
 }
 
 /// Writes all outputs, even if some of them fail, and reports the render.
@@ -198,6 +246,7 @@ fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> Render
         emission: arguments.emission.unwrap_or(EmissionChoice::of(arguments.estimator)),
         sampler: arguments.sampler.unwrap_or(Sampler::of(arguments.estimator)),
         seed: arguments.seed,
+        part: arguments.part,
     }
 }
 
@@ -209,6 +258,11 @@ fn default_output(scene: &Path) -> PathBuf {
 }
 
 fn outputs<'a>(arguments: &'a RenderArguments, output: &'a Path) -> impl Iterator<Item = &'a Path> {
-    let others = [&arguments.png, &arguments.profile_json, &arguments.trace];
+    let others = [
+        &arguments.png,
+        &arguments.profile_json,
+        &arguments.trace,
+        &arguments.state,
+    ];
     std::iter::once(output).chain(others.into_iter().filter_map(|file| file.as_deref()))
 }

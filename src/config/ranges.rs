@@ -1,7 +1,7 @@
 //! Ranges of settings, for arguments and for [`RenderConfig::check`](super::RenderConfig::check). Each function returns the
 //! value, or a text that says what it must be.
 
-use super::MAX_SIDE;
+use super::{MAX_SIDE, Part};
 
 /// The value, or what it must be.
 pub type Checked<T> = Result<T, String>;
@@ -19,6 +19,13 @@ pub fn resolution(sides: [u32; 2]) -> Checked<[u32; 2]> {
 /// A count of at least one.
 pub fn count(count: u32) -> Checked<u32> {
     checked(count, count > 0, || "must be at least 1".to_owned())
+}
+
+/// A part of several.
+pub fn part(part: Part) -> Checked<Part> {
+    checked(part, (1..=part.of).contains(&part.number), || {
+        "must be K/N with K from 1 to N".to_owned()
+    })
 }
 
 /// Eq. 2's α.

@@ -1,6 +1,7 @@
 //! A plain progressive photon mapper: the paper's algorithm step by step, without optimisations.
 
 mod radii;
+mod saved;
 
 use std::ops::Range;
 use std::time::Instant;
@@ -27,6 +28,7 @@ use crate::random::{CameraTurn, PathKind, Random};
 use crate::record::{Launch, Run};
 use crate::scene::Camera;
 use crate::sizes::PPM_SLOTS;
+use crate::state::Blocks;
 
 /// Photon paths that are traced before their photons are gathered.
 const BATCH: u32 = 1 << 18;
@@ -337,12 +339,16 @@ impl Backend for Renderer {
         ))
     }
 
-    fn iterations(&self) -> u32 {
-        self.totals.iterations
+    fn save(&mut self) -> Result<Blocks> {
+        self.learned()
     }
 
-    fn emitted(&self) -> u64 {
-        self.totals.emitted
+    fn restore(&mut self, learned: &Blocks) -> Result<()> {
+        self.continue_from(learned)
+    }
+
+    fn totals(&self) -> Totals {
+        self.totals
     }
 
     fn counters(&self) -> Counters {

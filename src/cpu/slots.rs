@@ -2,6 +2,7 @@
 
 use bytemuck::Zeroable;
 use glam::{DVec3, DVec4};
+use serde::{Deserialize, Serialize};
 
 use super::bsdf::Width;
 use super::camera::{CameraPath, VisiblePoint};
@@ -12,7 +13,7 @@ use crate::config::{SEQUENCES, Totals};
 use crate::layout::BehindGlass;
 
 /// Statistics of a visible point; a pixel has one slot for each visible point that its path can have.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Slot {
     pub statistics: Statistics,
     /// R² of this iteration's disc.
@@ -34,7 +35,7 @@ impl Slot {
 }
 
 /// State of a pixel.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Pixel {
     /// Emission and direct light, summed over the iterations.
     pub direct: DVec3,

@@ -3,11 +3,12 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec4};
+use serde::{Deserialize, Serialize};
 
 use crate::layout::{self, SMALLEST_RADIUS2};
 
 /// Photon statistics of a visible point over all iterations.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Statistics {
     /// R².
     pub radius2: f64,

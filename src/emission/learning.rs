@@ -4,6 +4,7 @@ mod cell;
 
 use bytemuck::Zeroable;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use self::cell::{BINS, Cell, Counts, Cut, PRIOR};
 use super::path_value::PathValue;
@@ -83,7 +84,7 @@ struct Counted {
 }
 
 /// The emission table and the statistics from which it is learned.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Aim {
     strata: Vec<Stratum>,
     cells: Vec<Cell>,

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use super::targets::{Targets, corners_of};
 use crate::layout::{DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT, Light, POINT_LIGHT, SPOT_LIGHT};
@@ -19,7 +20,7 @@ const EXPLORED: f64 = 0.2;
 const PROBES: usize = 64;
 
 /// Paths of a source that hit a target first.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Stratum {
     /// Range in [`PackedScene::lights`].
     pub lights: Range<u32>,

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::alias::{self, AliasCell};
 use crate::layout::{EmissionCell, Light};
 
@@ -12,13 +14,14 @@ pub const DIMENSIONS: usize = 5;
 const STEPS: f64 = 16_777_216.0;
 
 /// The sampling table of photon paths.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Table {
     /// Targets, smaller ones first: centre, radius; render units.
     pub spheres: Vec<[f32; 4]>,
     /// Index of the target around most of the view.
     pub view: Option<u32>,
     /// Boxes of starts.
+    #[serde(with = "crate::state::words")]
     pub cells: Vec<EmissionCell>,
 }
 

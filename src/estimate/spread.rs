@@ -1,6 +1,6 @@
 //! The value of a pixel by each sequence.
 
-use crate::config::{SEQUENCES, iterations_of};
+use crate::config::{SEQUENCES, SequenceIterations};
 
 const COUNT: usize = SEQUENCES as usize;
 
@@ -9,11 +9,9 @@ const COUNT: usize = SEQUENCES as usize;
 pub(super) struct Weights([f64; COUNT]);
 
 impl Weights {
-    /// After this number of iterations.
-    pub fn of(iterations: u32) -> Self {
-        let of_sequence =
-            |sequence: usize| f64::from(iterations_of(sequence as u32, iterations)) / f64::from(iterations);
-        Self(std::array::from_fn(of_sequence))
+    /// After these iterations.
+    pub fn of(iterations: SequenceIterations) -> Self {
+        Self(iterations.0.map(|count| f64::from(count) / iterations.total()))
     }
 }
 
@@ -61,7 +59,7 @@ mod tests {
 
     #[test]
     fn sequences_count_by_their_iterations() {
-        let spread = Spread::of(Weights::of(6), [3.0, 3.0, 0.0, 0.0]);
+        let spread = Spread::of(Weights::of(6.into()), [3.0, 3.0, 0.0, 0.0]);
         assert_eq!(spread.mean, 2.0);
         // Two sequences of a third each are off by 1, two of a sixth by 2.
         let expected = 8.0 / 13.0;

@@ -76,7 +76,7 @@ impl Renderer {
         self.device.download(BufferId::PathValues, Some(count))
     }
 
-    fn upload_table(&mut self, table: &Table) -> Result<()> {
+    pub(super) fn upload_table(&mut self, table: &Table) -> Result<()> {
         let mut texels = table.texels();
         // With its maximum size.
         let bytes = self.sizes.bytes(BufferId::EmissionTable).unwrap_or_default();

@@ -103,7 +103,7 @@ pub(super) fn limits(device: &DeviceSummary, loop_limit: u32, scene: &PackedScen
 
 /// The buffers of the scene. The hierarchy is a placeholder if rays are traced by ray queries, the paper's precomputed triangles
 /// unless its triangle test is used.
-pub(super) fn scene_buffers<'a>(scene: &'a PackedScene, config: &RenderConfig) -> [(BufferId, &'a [u8]); 14] {
+pub fn scene_buffers<'a>(scene: &'a PackedScene, config: &RenderConfig) -> [(BufferId, &'a [u8]); 14] {
     let havel = match config.triangle_test {
         TriangleTest::Havel => scene.havel_triangles.len(),
         TriangleTest::Watertight => scene.havel_triangles.len().min(1),

@@ -5,12 +5,14 @@ mod fitting;
 mod iteration;
 mod memory;
 mod radii;
+mod saved;
 mod stages;
 
 use fitting::{build_structures, check_fits};
 use iteration::Begun;
 pub use memory::Memory;
-use memory::{bindable_bytes, limits, scene_buffers};
+pub use memory::scene_buffers;
+use memory::{bindable_bytes, limits};
 pub use stages::Stages;
 
 use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
@@ -26,6 +28,7 @@ use crate::record::{Recording, Run};
 use crate::scene::Camera;
 use crate::sizes::{Limits, Probe, Sizes};
 use crate::stage::{BufferId, SEQUENCE_FILMS};
+use crate::state::Blocks;
 use stages::{method_stages, reporting};
 
 /// A progressive render on a device.
@@ -302,12 +305,16 @@ impl Backend for Renderer {
         self.picture().map(|(_, resolved)| resolved)
     }
 
-    fn iterations(&self) -> u32 {
-        self.totals.iterations
+    fn save(&mut self) -> Result<Blocks> {
+        self.learned()
     }
 
-    fn emitted(&self) -> u64 {
-        self.totals.emitted
+    fn restore(&mut self, learned: &Blocks) -> Result<()> {
+        self.continue_from(learned)
+    }
+
+    fn totals(&self) -> Totals {
+        self.totals
     }
 
     fn counters(&self) -> Counters {

@@ -37,6 +37,7 @@ impl Renderer {
             self.config.drop_unwanted &= radius::is_dropping_worth_it(landed, kept, self.aim.is_some());
             self.reset()?;
             self.fit_radii()?;
+            self.scale_radii()?;
         }
         let statistics: Vec<Statistics> = self
             .device
@@ -84,6 +85,22 @@ impl Renderer {
         // A launch count from radii that were too large does not apply to later gathers.
         self.sizes.gather_parts = 1;
         Ok(())
+    }
+
+    /// Automatic radii of a part of several are smaller.
+    fn scale_radii(&mut self) -> Result<()> {
+        let factor = self.config.part.radius2_factor(self.config.alpha);
+        if factor == 1.0 {
+            return Ok(());
+        }
+        self.settings.first_footprints = self.settings.first_footprints.map(|first| first * factor.sqrt());
+        self.upload_settings()?;
+        let mut statistics: Vec<Statistics> = self.device.download(BufferId::StatisticsOf, None)?;
+        for of_slot in &mut statistics {
+            of_slot.radius2_high *= factor;
+            of_slot.radius2_low *= factor;
+        }
+        self.device.upload(BufferId::StatisticsOf, &statistics)
     }
 
     fn reset(&mut self) -> Result<()> {

@@ -1,13 +1,19 @@
 //! The public interface for rendering: a scene in, pictures out.
 
+mod merge;
 mod prepared;
 mod rendered;
+mod snapshot;
+mod state;
 mod until;
 mod warning;
 mod work;
 
+pub use merge::Merge;
 pub use prepared::PreparedScene;
 pub use rendered::{Failure, Rendered};
+pub use snapshot::{Snapshot, Snapshots};
+pub use state::State;
 pub use until::{Progress, Until};
 pub use warning::Warning;
 
@@ -23,6 +29,8 @@ use crate::gpu::Device;
 use crate::record::Run;
 use crate::scene::Camera;
 use crate::{cpu, pipeline};
+use rendered::About;
+use state::Identity;
 use work::Work;
 
 /// The platform of a render.
@@ -48,6 +56,8 @@ pub struct Hooks<'a> {
     pub progress: &'a dyn Fn(Progress),
     /// Whether [`Rendered::profile`] collects launches: those of a day take gigabytes.
     pub profile: bool,
+    /// Pictures and states while the render goes on.
+    pub snapshots: Option<Snapshots<'a>>,
 }
 
 impl Default for Hooks<'_> {
@@ -56,6 +66,7 @@ impl Default for Hooks<'_> {
             stop: &|| false,
             progress: &|_| (),
             profile: false,
+            snapshots: None,
         }
     }
 }
@@ -86,6 +97,9 @@ pub struct Session {
     estimate: ErrorEstimate,
     warnings: Vec<Warning>,
     scene: String,
+    identity: Identity,
+    /// Power of the scene's lights.
+    power: f64,
     /// Render units per scene unit.
     scale: f64,
     /// Rendering time so far.
@@ -125,13 +139,15 @@ impl Session {
         {
             warnings.push(Warning::WithoutRayQueries(why.to_owned()));
         }
-        let estimate = ErrorEstimate::new(&config, of_one_photon(packed, backend, &config));
+        let estimate = ErrorEstimate::new(&config, of_one_photon(packed.power, backend, &config));
         Ok(Self {
             renderer,
+            identity: Identity::of(scene, camera, &config, is_cpu),
             config,
             estimate,
             warnings,
             scene: scene.name().to_owned(),
+            power: packed.power,
             scale: packed.scale,
             spent: Duration::ZERO,
         })
@@ -150,14 +166,57 @@ impl Session {
     /// # Errors
     /// As [`Session::render`].
     pub fn render_with(&mut self, until: Until, hooks: &Hooks<'_>) -> Result<Rendered> {
+        let about = self.about();
         let work = Work {
             until,
-            estimate: self.estimate,
             hooks,
+            about: &about,
         };
         let done = work.run(self.renderer.backend_mut())?;
         self.spent += done.time;
-        Ok(Rendered::new(self, done))
+        Ok(Rendered::new(&about, done))
+    }
+
+    fn about(&self) -> About {
+        About {
+            scene: self.scene.clone(),
+            config: self.config.clone(),
+            gather: self.gather(),
+            device: self.device(),
+            estimate: self.estimate,
+            spent: self.spent,
+            identity: self.identity.clone(),
+        }
+    }
+
+    /// What it has learned so far: another process can go on from it.
+    ///
+    /// # Errors
+    /// Whatever the device can't do.
+    pub fn state(&mut self) -> Result<State> {
+        let about = self.about();
+        let backend = self.renderer.backend_mut();
+        // The picture is of use to parts alone.
+        let picture = if self.config.part.is_whole() {
+            None
+        } else {
+            Some(backend.resolve_all()?)
+        };
+        State::of(&about, backend, picture.as_ref(), self.spent)
+    }
+
+    /// Goes on from a state of this scene with these settings: on the same device, further iterations give the same bits as if
+    /// the render had not been interrupted.
+    ///
+    /// # Errors
+    /// A state of another render, which is told with what differs; whatever the device can't do.
+    pub fn resume(&mut self, state: &State) -> Result<()> {
+        state.of.check_is(&self.identity)?;
+        self.renderer.backend_mut().restore(&state.blocks)?;
+        self.spent = state.spent()?;
+        let photon = of_one_photon(self.power, self.renderer.backend(), &self.config);
+        self.estimate = ErrorEstimate::new(&self.config, photon);
+        Ok(())
     }
 
     /// Runs one iteration, and returns the times of its launches. Unlike [`Session::render`], it keeps no picture for the case

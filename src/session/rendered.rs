@@ -2,11 +2,17 @@
 
 use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
 
+use super::Warning;
+use super::state::Identity;
 use super::work::Done;
-use super::{Session, Warning};
-use crate::backend::Resolved;
+use crate::backend::{DeviceDescription, Resolved};
+use crate::config::{RenderConfig, SequenceIterations};
 use crate::error::{Error, Result};
+#[cfg(test)]
+use crate::estimate::OnePhoton;
 use crate::estimate::{ErrorEstimate, RelativeError};
 use crate::film::{self, Image, Layers, Metadata};
 use crate::report::{Profile, Subject};
@@ -36,78 +42,121 @@ impl fmt::Display for Failure {
     }
 }
 
+/// What is known of a render before it begins.
+pub(super) struct About {
+    pub scene: String,
+    pub config: RenderConfig,
+    pub gather: &'static str,
+    pub device: DeviceDescription,
+    pub estimate: ErrorEstimate,
+    /// Rendering time before.
+    pub spent: Duration,
+    pub identity: Identity,
+}
+
+#[cfg(test)]
+impl About {
+    /// For tests of the work alone.
+    pub fn of_nothing() -> Self {
+        let config = RenderConfig::default();
+        Self {
+            scene: String::new(),
+            gather: "",
+            device: DeviceDescription {
+                name: String::new(),
+                driver: String::new(),
+                timestamp_period_ns: 1.0,
+            },
+            estimate: ErrorEstimate::new(&config, OnePhoton::default()),
+            config,
+            spent: Duration::ZERO,
+            identity: Identity::default(),
+        }
+    }
+}
+
+/// What a [`Rendered`] is made of.
+pub(super) struct Of {
+    pub picture: Arc<Resolved>,
+    pub metadata: Metadata,
+    pub iterations: SequenceIterations,
+    pub estimate: ErrorEstimate,
+    pub error: Option<RelativeError>,
+    pub subject: Subject,
+    pub max_depth: u32,
+    pub profile: Profile,
+    pub failure: Option<Failure>,
+}
+
 /// A picture with its errors, warnings and profile.
-pub struct Rendered {
-    picture: Resolved,
-    metadata: Metadata,
-    estimate: ErrorEstimate,
-    error: Option<RelativeError>,
-    subject: Subject,
-    max_depth: u32,
-    profile: Profile,
-    failure: Option<Failure>,
+pub struct Rendered(Of);
+
+impl From<Of> for Rendered {
+    fn from(of: Of) -> Self {
+        Self(of)
+    }
 }
 
 impl Rendered {
-    pub(super) fn new(session: &Session, done: Done) -> Self {
-        let backend = session.renderer.backend();
-        let error = session.estimate.relative(done.iterations, &done.picture);
+    pub(super) fn new(about: &About, done: Done) -> Self {
+        let error = about.estimate.relative(done.iterations, &done.picture);
         let subject = Subject {
-            scene: session.scene.clone(),
-            resolution: session.config.resolution,
-            gather: session.gather().to_owned(),
-            photons: session.config.photons,
+            scene: about.scene.clone(),
+            resolution: about.config.resolution,
+            gather: about.gather.to_owned(),
+            photons: about.config.photons,
             photons_emitted: done.emitted,
-            device: backend.device(),
-            counters: backend.counters(),
+            device: about.device.clone(),
+            counters: done.counters,
         };
-        Self {
+        Self(Of {
             metadata: Metadata {
                 iterations: u64::from(done.iterations),
                 photons_emitted: done.emitted,
-                seed: u64::from(session.config.seed),
+                seed: u64::from(about.config.seed),
                 device: subject.device.name.clone(),
-                seconds: (session.spent - done.time).as_secs_f64() + done.seconds,
+                seconds: about.spent.as_secs_f64() + done.seconds,
                 estimated_error: error.map(|error| error.total),
             },
+            iterations: done.iterations.into(),
             picture: done.picture,
-            estimate: session.estimate,
+            estimate: about.estimate,
             error,
             subject,
-            max_depth: session.config.max_depth,
+            max_depth: about.config.max_depth,
             profile: done.profile,
             failure: done.failure,
-        }
+        })
     }
 
     /// The picture.
     pub fn image(&self) -> &Image {
-        &self.picture.image
+        &self.0.picture.image
     }
 
     /// Of each pixel, the share of its camera paths that met a surface.
     pub fn alpha(&self) -> &[f32] {
-        &self.picture.alpha
+        &self.0.picture.alpha
     }
 
     /// Iterations in it.
     pub fn iterations(&self) -> u32 {
-        self.metadata.iterations as u32
+        self.0.metadata.iterations as u32
     }
 
     /// Seconds of rendering.
     pub fn seconds(&self) -> f64 {
-        self.metadata.seconds
+        self.0.metadata.seconds
     }
 
     /// Its estimated error; `None` after fewer than four iterations, and if it is black.
     pub fn error(&self) -> Option<RelativeError> {
-        self.error
+        self.0.error
     }
 
     /// The estimated error of each pixel, in units of radiance; `None` as in [`Rendered::error`].
     pub fn pixel_errors(&self) -> Option<Image> {
-        self.estimate.of_pixels(self.iterations(), &self.picture)
+        self.0.estimate.of_pixels(self.0.iterations, &self.0.picture)
     }
 
     /// Warnings about the picture.
@@ -116,8 +165,8 @@ impl Rendered {
             counters,
             photons_emitted,
             ..
-        } = &self.subject;
-        let mut warnings = Warning::of(counters, *photons_emitted, self.max_depth);
+        } = &self.0.subject;
+        let mut warnings = Warning::of(counters, *photons_emitted, self.0.max_depth);
         if self.image().pixels().iter().flatten().all(|&value| value == 0.0) {
             warnings.push(Warning::Black);
         }
@@ -126,17 +175,17 @@ impl Rendered {
 
     /// The failure that ended it early.
     pub fn failure(&self) -> Option<&Failure> {
-        self.failure.as_ref()
+        self.0.failure.as_ref()
     }
 
     /// The subject of its profile, with counters.
     pub fn subject(&self) -> &Subject {
-        &self.subject
+        &self.0.subject
     }
 
     /// Every launch of the render call, if [`Hooks::profile`](super::Hooks::profile) is set.
     pub fn profile(&self) -> &Profile {
-        &self.profile
+        &self.0.profile
     }
 
     /// Writes an OpenEXR file: linear RGB, alpha, the error of each pixel, and render metadata as attributes.
@@ -146,10 +195,10 @@ impl Rendered {
     pub fn write_exr(&self, path: &Path) -> Result<()> {
         let errors = self.pixel_errors();
         let layers = Layers {
-            alpha: Some(&self.picture.alpha),
+            alpha: Some(&self.0.picture.alpha),
             errors: errors.as_ref(),
         };
-        film::write_exr(self.image(), layers, path, &self.metadata)
+        film::write_exr(self.image(), layers, path, &self.0.metadata)
     }
 
     /// Writes a tone-mapped PNG, with an exposure in stops.

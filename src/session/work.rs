@@ -1,9 +1,11 @@
 //! The iterations of a render, until they end or one fails.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::{Failure, Hooks, Progress, Until};
-use crate::backend::{Backend, Resolved};
+use super::rendered::About;
+use super::{Failure, Hooks, Progress, Rendered, Snapshot, State, Until};
+use crate::backend::{Backend, Counters, Resolved};
 use crate::error::{Error, Result};
 use crate::estimate::ErrorEstimate;
 use crate::report::Profile;
@@ -15,16 +17,18 @@ const KEEPING: f64 = 0.01;
 pub struct Work<'a> {
     /// Limits.
     pub until: Until,
-    /// Estimator of its error.
-    pub estimate: ErrorEstimate,
     /// Callbacks of the caller.
     pub hooks: &'a Hooks<'a>,
+    /// What it renders.
+    pub about: &'a About,
 }
 
 /// The result.
 pub struct Done {
     /// The picture.
-    pub picture: Resolved,
+    pub picture: Arc<Resolved>,
+    /// Counters of the render.
+    pub counters: Counters,
     /// Iterations in it.
     pub iterations: u32,
     /// Photon paths in it.
@@ -41,7 +45,8 @@ pub struct Done {
 
 /// An intermediate picture.
 struct Kept {
-    picture: Resolved,
+    picture: Arc<Resolved>,
+    counters: Counters,
     iterations: u32,
     emitted: u64,
     /// Rendering time in seconds.
@@ -55,15 +60,30 @@ impl Kept {
     /// The picture so far of a render that began at `start`.
     fn make(backend: &mut dyn Backend, start: Instant) -> Result<Self> {
         let begin = Instant::now();
-        let picture = backend.resolve_all()?;
+        let picture = backend.resolve_all()?.into();
         Ok(Self {
             picture,
+            counters: backend.counters(),
             iterations: backend.iterations(),
             emitted: backend.emitted(),
             seconds: (begin - start).as_secs_f64(),
             at: Instant::now(),
             cost: begin.elapsed(),
         })
+    }
+
+    /// As the result of a render that ended with it.
+    fn done(&self, time: Duration) -> Done {
+        Done {
+            picture: self.picture.clone(),
+            counters: self.counters,
+            iterations: self.iterations,
+            emitted: self.emitted,
+            seconds: self.seconds,
+            time,
+            profile: Profile::default(),
+            failure: None,
+        }
     }
 
     fn is_old(&self) -> bool {
@@ -82,6 +102,7 @@ impl Work<'_> {
         let done = |backend: &dyn Backend, error| self.until.done(backend.iterations(), start.elapsed(), error);
         let stop = || stopped() || self.until.time.is_some_and(|time| start.elapsed() >= time);
         let mut profile = Profile::default();
+        let mut taken = start;
         let mut kept: Option<Kept> = None;
         let mut error = None;
         let mut failure = None;
@@ -92,7 +113,12 @@ impl Work<'_> {
             let next = backend.iterations() + 1;
             let is_due = ErrorEstimate::is_due(next);
             let is_last = self.until.iterations.is_some_and(|most| next >= most);
-            let another = !(is_due || is_last || stop() || kept.as_ref().is_none_or(Kept::is_old));
+            let is_snapshot = self
+                .hooks
+                .snapshots
+                .as_ref()
+                .is_some_and(|s| taken.elapsed() >= s.every);
+            let another = !(is_due || is_last || is_snapshot || stop() || kept.as_ref().is_none_or(Kept::is_old));
             has_begun = another;
             let run = if another {
                 backend.iterate_before_another(&stop)
@@ -101,13 +127,16 @@ impl Work<'_> {
             };
             let run = run.and_then(|run| {
                 let iterations = backend.iterations();
-                if run.is_some() && !another && (is_due || kept.as_ref().is_none_or(Kept::is_old)) {
+                let is_made = is_due || is_snapshot || kept.as_ref().is_none_or(Kept::is_old);
+                if run.is_some() && !another && is_made {
                     let made = Kept::make(backend, start)?;
                     if is_due {
-                        error = self
-                            .estimate
-                            .relative(iterations, &made.picture)
-                            .map(|error| error.total);
+                        let estimate = self.about.estimate;
+                        error = estimate.relative(iterations, &made.picture).map(|error| error.total);
+                    }
+                    if is_snapshot {
+                        self.take_snapshot(backend, &made, start.elapsed())?;
+                        taken = Instant::now();
                     }
                     kept = Some(made);
                 }
@@ -147,26 +176,42 @@ impl Work<'_> {
             kept: kept.iterations,
         });
         Ok(Done {
-            picture: kept.picture,
-            iterations: kept.iterations,
-            emitted: kept.emitted,
-            seconds: kept.seconds,
-            time: start.elapsed(),
             profile,
             failure,
+            ..kept.done(start.elapsed())
         })
+    }
+
+    /// Gives the caller the picture so far, made after this time, and the state.
+    fn take_snapshot(&self, backend: &mut dyn Backend, made: &Kept, time: Duration) -> Result<()> {
+        let Some(snapshots) = &self.hooks.snapshots else {
+            return Ok(());
+        };
+        let state = if snapshots.with_state {
+            let spent = self.about.spent + time;
+            Some(State::of(self.about, backend, Some(&made.picture), spent)?)
+        } else {
+            None
+        };
+        (snapshots.take)(Snapshot {
+            rendered: Rendered::new(self.about, made.done(time)),
+            state,
+        });
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::{Counters, DeviceDescription};
-    use crate::config::RenderConfig;
-    use crate::estimate::OnePhoton;
+    use crate::backend::DeviceDescription;
+    use crate::config::Totals;
     use crate::layout::BehindGlass;
     use crate::record::Run;
+    use crate::session::Snapshots;
+    use crate::state::Blocks;
     use bytemuck::Zeroable as _;
+    use std::cell::RefCell;
 
     /// A device that is lost in an iteration, and whose pictures are as bright as it has done iterations.
     struct Lost {
@@ -212,12 +257,23 @@ mod tests {
             ))
         }
 
-        fn iterations(&self) -> u32 {
-            self.iterations
+        fn save(&mut self) -> Result<Blocks> {
+            let mut blocks = Blocks::default();
+            blocks.put("iterations", &self.iterations)?;
+            Ok(blocks)
         }
 
-        fn emitted(&self) -> u64 {
-            10 * u64::from(self.iterations)
+        fn restore(&mut self, learned: &Blocks) -> Result<()> {
+            self.iterations = learned.get("iterations")?;
+            Ok(())
+        }
+
+        fn totals(&self) -> Totals {
+            Totals {
+                iterations: self.iterations,
+                emitted: 10 * u64::from(self.iterations),
+                camera_paths: self.iterations,
+            }
         }
 
         fn counters(&self) -> Counters {
@@ -256,7 +312,7 @@ mod tests {
         };
         let work = Work {
             until,
-            estimate: ErrorEstimate::new(&RenderConfig::default(), OnePhoton::default()),
+            about: &About::of_nothing(),
             hooks: &hooks,
         };
         work.run(device)
@@ -296,6 +352,31 @@ mod tests {
         assert_eq!(done.expect("a picture").iterations, 1);
         let done = run(&mut lost_in(9, true), Until::time(Duration::from_nanos(1)), &|| false);
         assert_eq!(done.expect("a picture").iterations, 1);
+    }
+
+    #[test]
+    fn snapshots_are_pictures_and_states_of_the_same_iterations() {
+        let taken = RefCell::new(Vec::new());
+        let hooks = Hooks {
+            snapshots: Some(Snapshots {
+                every: Duration::ZERO,
+                with_state: true,
+                take: &|snapshot| {
+                    let iterations = snapshot.state.expect("a state").blocks.get::<u32>("iterations");
+                    taken
+                        .borrow_mut()
+                        .push((snapshot.rendered.iterations(), iterations.expect("a number")));
+                },
+            }),
+            ..Hooks::default()
+        };
+        let work = Work {
+            until: Until::iterations(3),
+            about: &About::of_nothing(),
+            hooks: &hooks,
+        };
+        work.run(&mut lost_in(u32::MAX, true)).expect("a picture");
+        assert_eq!(taken.into_inner(), [(1, 1), (2, 2), (3, 3)]);
     }
 
     #[test]

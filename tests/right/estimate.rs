@@ -51,7 +51,7 @@ fn the_true_error_lies_within_a_factor_of_one_and_a_half_of_its_estimate() {
             ..small(SIDE, 25_000)
         };
         let mut renderer = subject.renderer(config.clone());
-        let photon = of_one_photon(&subject.packed, &renderer, &config);
+        let photon = of_one_photon(subject.packed.power, &renderer, &config);
         let estimate = ErrorEstimate::new(&config, photon);
         for iterations in 1..=64 {
             renderer.iterate().expect("iteration");
@@ -150,7 +150,7 @@ fn estimated_on(subject: &Subject, photons: u32, radius: Option<f64>) -> (Relati
         ..small(SIDE, photons)
     };
     let mut renderer = subject.renderer(config.clone());
-    let estimate = ErrorEstimate::new(&config, of_one_photon(&subject.packed, &renderer, &config));
+    let estimate = ErrorEstimate::new(&config, of_one_photon(subject.packed.power, &renderer, &config));
     for _ in 0..ITERATIONS {
         renderer.iterate().expect("iteration");
     }

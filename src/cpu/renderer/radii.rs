@@ -46,6 +46,12 @@ impl Renderer {
                 }
             }
         }
+        let factor = self.config.part.radius2_factor(self.config.alpha);
+        if self.config.radius.is_none() && factor != 1.0 {
+            self.settings.first_footprints[0] *= factor.sqrt();
+            let slots = self.slots.iter_mut();
+            slots.for_each(|slot| slot.statistics.radius2 *= f64::from(factor));
+        }
         self.find_discs();
         let mut radii2: Vec<f64> = self
             .statistics()

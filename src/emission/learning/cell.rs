@@ -1,5 +1,7 @@
 //! Cells of starts, the statistics of their paths, and how they are split.
 
+use serde::{Deserialize, Serialize};
+
 use crate::emission::table::DIMENSIONS;
 
 /// Rays and starts that each cell is assumed to have had before, with the average value.
@@ -16,7 +18,7 @@ const SIGNIFICANT: f64 = 24.0;
 const THINNEST: f32 = 1.0 / 65536.0;
 
 /// Statistics of a cell's paths: sums in path order, so that they have the same bits in every run.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Counts {
     pub paths: f64,
     pub value: f64,
@@ -69,7 +71,7 @@ fn of_half(sums: [f64; BINS], upper: bool) -> [f64; BINS] {
 }
 
 /// A box of a stratum's starts.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Cell {
     pub stratum: usize,
     pub low: [f32; DIMENSIONS],

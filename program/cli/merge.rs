@@ -1,0 +1,91 @@
+//! Adds up the parts of a render.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Error, Result};
+use clap::Args;
+
+use super::Outcome;
+use super::args::{exposure, exr_file, png_file};
+use super::outputs::{all, check_outputs, named};
+use ppm_vk::internals::files::Writing;
+use ppm_vk::{Merge, Rendered, State};
+
+/// Merge the states of parts (--part K/N --state FILE) into a picture. The order of parts does not matter, to the bit.
+#[derive(Debug, Args)]
+pub struct MergeArguments {
+    /// States of parts, or of merged parts.
+    #[arg(required = true, value_name = "PART.state")]
+    pub parts: Vec<PathBuf>,
+    /// Linear RGB OpenEXR picture.
+    #[arg(short, long, value_name = "FILE.exr", value_parser = exr_file)]
+    pub output: PathBuf,
+    /// Tone-mapped picture.
+    #[arg(long, value_name = "FILE.png", value_parser = png_file)]
+    pub png: Option<PathBuf>,
+    /// Exposure of the PNG, in stops.
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
+    pub exposure: f32,
+    /// Write the sum, which can be merged with other parts.
+    #[arg(long, value_name = "FILE", value_parser = named("state"))]
+    pub state: Option<PathBuf>,
+}
+
+/// The command.
+pub fn run(arguments: &MergeArguments) -> Result<Outcome> {
+    let inputs: Vec<&Path> = arguments.parts.iter().map(PathBuf::as_path).collect();
+    let outputs = [
+        Some(&arguments.output),
+        arguments.png.as_ref(),
+        arguments.state.as_ref(),
+    ];
+    check_outputs(&inputs, outputs.into_iter().flatten().map(PathBuf::as_path))?;
+    let mut merge: Option<Merge> = None;
+    for path in &arguments.parts {
+        let state = State::read(path)?;
+        let added = match &mut merge {
+            Some(merge) => merge.add(&state),
+            none => Merge::new(&state).map(|merge| *none = Some(merge)),
+        };
+        added.with_context(|| path.display().to_string())?;
+    }
+    let merge = merge.context("no part is given")?;
+    let rendered = merge.rendered();
+    say_merged(&merge, &rendered, &arguments.output);
+    let _writing = Writing::begin();
+    let written = [
+        Some(rendered.write_exr(&arguments.output)),
+        arguments
+            .png
+            .as_ref()
+            .map(|png| rendered.write_png(png, arguments.exposure)),
+        arguments.state.as_ref().map(|file| merge.state()?.write(file)),
+    ];
+    all(written
+        .into_iter()
+        .flatten()
+        .map(|written| written.map_err(Error::from)))?;
+    Ok(Outcome::Done)
+}
+
+fn say_merged(merge: &Merge, rendered: &Rendered, output: &Path) {
+    let missing = merge.missing();
+    if !missing.is_empty() {
+        let numbers: Vec<String> = missing.iter().map(u32::to_string).collect();
+        say!(
+            "warning: of {} parts, {} are missing ({}): the picture is noisier than the whole",
+            merge.parts(),
+            missing.len(),
+            numbers.join(", ")
+        );
+    }
+    say!(
+        "{}: {} of {} parts, {} iterations, {} photon paths{}",
+        output.display(),
+        merge.parts() as usize - missing.len(),
+        merge.parts(),
+        rendered.iterations(),
+        rendered.subject().photons_emitted,
+        rendered.error().map_or(String::new(), |error| format!("; {error}")),
+    );
+}
