@@ -38,7 +38,12 @@ impl Identity {
             content.update(format!("{id:?} {}", bytes.len()).as_bytes());
             content.update(bytes);
         }
-        content.update(bytemuck::bytes_of(&settings(config, packed, camera, 0)));
+        // The same for all parts.
+        let whole = RenderConfig {
+            part: Part::WHOLE,
+            ..config.clone()
+        };
+        content.update(bytemuck::bytes_of(&settings(&whole, packed, camera, 0)));
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             renderer: if is_cpu { "cpu" } else { "vulkan" }.to_owned(),
