@@ -64,6 +64,7 @@ fn imports_go_downward() {
     let forbidden: &[(&str, &[&[&str]])] = &[
         ("layout", &[&[""]]),
         ("alias.rs", &[&[""]]),
+        ("state", &[SCENES, RENDERERS, &["record", "config", "layout"]]),
         ("stage.rs", &[SCENES, RENDERERS, &["record"]]),
         ("record.rs", &[SCENES, RENDERERS]),
         ("gather", &[SCENES, RENDERERS]),
