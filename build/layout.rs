@@ -83,6 +83,7 @@ fn type_of(Shape { scalar, columns, rows }: Shape) -> (String, String) {
         (1, 1) => (one.to_owned(), String::new()),
         (2..=4, 1) => (format!("{vector}{columns}"), String::new()),
         (_, 1) => (one.to_owned(), format!("[{columns}]")),
+        (_, 5..) => (format!("{vector}{columns}"), format!("[{rows}]")),
         // GLSL's type names the columns, which are contiguous here.
         _ => (format!("mat{rows}x{columns}"), String::new()),
     }

@@ -259,6 +259,7 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         padding0: 0,
         padding1: 0,
         padding2: 0,
+        filter_places: bytemuck::cast(config.filter.places()),
         camera_media: scene.immersion.media_at(camera.position),
     }
 }

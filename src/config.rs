@@ -1,12 +1,14 @@
 //! Settings of a render.
 
 mod choice;
+mod filter;
 mod part;
 pub mod ranges;
 mod tiles;
 
 pub use choice::Choice;
 pub(crate) use choice::choices;
+pub use filter::PixelFilter;
 pub use part::Part;
 pub use tiles::pixel_of;
 
@@ -141,6 +143,8 @@ pub struct RenderConfig {
     pub sampler: Sampler,
     /// Seed of all random numbers.
     pub seed: u32,
+    /// How a pixel weighs the film around its centre, by the estimator `sppm`; `ppm` has the centre alone.
+    pub filter: PixelFilter,
     /// Which of several independent parts it renders.
     pub part: Part,
 }
@@ -208,6 +212,7 @@ impl RenderConfig {
         aims_anyway: false,
         sampler: Sampler::of(Estimator::Sppm),
         seed: 0,
+        filter: PixelFilter::Box,
         part: Part::WHOLE,
     };
 

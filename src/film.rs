@@ -5,11 +5,13 @@
 mod hdr;
 mod openexr;
 mod png;
+mod tone;
 
 pub use crate::files::{check_writable, write_whole};
 pub use hdr::{hdr_pixels, read_hdr};
 pub use openexr::{Layers, exr_pixels, read_exr, write_exr};
 pub use png::{write_png, write_rgb8};
+pub use tone::{Exposure, Look, Tone};
 
 /// A picture of linear RGB radiance with Rec. 709 primaries.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,7 +6,7 @@
 //! ```no_run
 //! use std::path::Path;
 //!
-//! use ppm_vk::{LoadOptions, Platform, PreparedScene, RenderConfig, Scene, Session, Until};
+//! use ppm_vk::{LoadOptions, Look, Platform, PreparedScene, RenderConfig, Scene, Session, Until};
 //!
 //! fn main() -> ppm_vk::Result<()> {
 //!     let scene = Scene::load_with(Path::new("room.gltf"), LoadOptions::default())?;
@@ -26,7 +26,7 @@
 //!     let rendered = session.render(Until::error(0.02))?;
 //!     rendered.write_exr(Path::new("room.exr"))?;
 //!     let better = session.render(Until::iterations(2 * rendered.iterations()))?;
-//!     better.write_png(Path::new("room.png"), 0.0)?;
+//!     better.write_png(Path::new("room.png"), Look::default())?;
 //!     if let Some(error) = better.error() {
 //!         println!("{error}");
 //!     }
@@ -80,10 +80,12 @@ mod state;
 mod text;
 
 pub use backend::{Counters, DeviceDescription};
-pub use config::{Accel, Choice, Direct, EmissionChoice, Estimator, Part, RenderConfig, Sampler, TriangleTest};
+pub use config::{
+    Accel, Choice, Direct, EmissionChoice, Estimator, Part, PixelFilter, RenderConfig, Sampler, TriangleTest,
+};
 pub use error::{Error, Remedy, Result, Setting};
 pub use estimate::RelativeError;
-pub use film::{Image, read_exr};
+pub use film::{Exposure, Image, Look, Tone, read_exr};
 pub use gpu::{DeviceSummary, best_device, devices};
 pub use loader::{LightUnits, LoadOptions};
 pub use metrics::{Comparison, compare, flip};

@@ -19,6 +19,7 @@ layout(local_size_x = 64) in;
 // are found once and have to cover both branches).
 layout(constant_id = 1) const uint SLOTS = 1u;
 layout(constant_id = 2) const bool JITTER = true;
+layout(constant_id = 35) const bool FILTERED = false;
 layout(constant_id = 19) const bool LENS = false;
 
 layout(push_constant) uniform CameraTurnPush {
@@ -66,6 +67,16 @@ void load_transmitted(inout Branch branch) {
     branch.media = kept_media(FIRST_KEPT_BY_KERNEL + 9u);
 }
 
+// The place relative to the pixel's centre that belongs to a uniform number: PixelFilter::place of src/config/filter.rs.
+float filter_place(float number) {
+    float at = sqrt(max(1.0 - abs(2.0 * number - 1.0), 0.0)) * float(FILTER_PLACES - 1u);
+    uint i = min(uint(at), FILTER_PLACES - 2u);
+    float before = settings.filter_places[i / 4u][i % 4u];
+    float behind = settings.filter_places[(i + 1u) / 4u][(i + 1u) % 4u];
+    float distance = mix(before, behind, at - float(i));
+    return number < 0.5 ? -distance : distance;
+}
+
 void main() {
     uint pixel_slot = invocation_index();
     if (pixel_slot >= pixel_slots() || status.retry != 0u) {
@@ -78,7 +89,11 @@ void main() {
         random_of_pixel(CAMERA_PATH, pixel.y * settings.resolution.x + pixel.x, CameraTurn(push.iteration, push.path, push.paths),
                         settings.seed);
     vec4 u = next4(random);
-    vec2 film = (vec2(pixel) + (JITTER ? u.xy : vec2(0.5))) / vec2(settings.resolution) * 2.0 - 1.0;
+    vec2 place = JITTER ? u.xy : vec2(0.5);
+    if (FILTERED) {
+        place = JITTER ? 0.5 + vec2(filter_place(u.x), filter_place(u.y)) : place;
+    }
+    vec2 film = (vec2(pixel) + place) / vec2(settings.resolution) * 2.0 - 1.0;
 
     uint slots_of_pixel = SLOTS;
     bool many = slots_of_pixel > 1u;
@@ -86,10 +101,10 @@ void main() {
     uint pending_count = 0u;
     uint used = 0u;
     Branch branch;
-    vec3 place = film.x * settings.camera_right.xyz - film.y * settings.camera_up.xyz;
+    vec3 on_film = film.x * settings.camera_right.xyz - film.y * settings.camera_up.xyz;
     bool parallel = settings.camera_up.w != 0.0;
-    branch.origin = settings.camera_position.xyz + (parallel ? place : vec3(0.0));
-    branch.direction = settings.camera_forward.xyz + (parallel ? vec3(0.0) : place);
+    branch.origin = settings.camera_position.xyz + (parallel ? on_film : vec3(0.0));
+    branch.direction = settings.camera_forward.xyz + (parallel ? vec3(0.0) : on_film);
     float lens_radius = settings.camera_position.w;
     if (LENS && lens_radius > 0.0) {
         // All rays of a point of the picture meet in the plane of focus.

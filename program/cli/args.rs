@@ -14,7 +14,10 @@ use super::outputs::named;
 use super::scene::SceneArguments;
 use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
-use ppm_vk::{Accel, Choice, Direct, EmissionChoice, Estimator, Part, RenderConfig, Sampler, TriangleTest};
+use ppm_vk::{
+    Accel, Choice, Direct, EmissionChoice, Estimator, Exposure, Look, Part, PixelFilter, RenderConfig, Sampler, Tone,
+    TriangleTest,
+};
 
 /// Maximum shift of the film, in units of the picture's larger side.
 const FARTHEST_SHIFT: f32 = 1000.0;
@@ -88,6 +91,23 @@ pub enum BackendChoice {
     Cpu,
 }
 
+/// How a PNG shows the picture.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct LookArguments {
+    /// Exposure of the PNG, in stops; auto shows the geometric mean of the picture as a middle grey.
+    #[arg(long, value_name = "EV|auto", default_value = "0", allow_negative_numbers = true, value_parser = exposure)]
+    exposure: Exposure,
+    /// Tone mapper of the PNG.
+    #[arg(long, default_value_t = Tone::Neutral, value_parser = choice::<Tone>())]
+    tone: Tone,
+}
+
+impl From<LookArguments> for Look {
+    fn from(LookArguments { exposure, tone }: LookArguments) -> Self {
+        Self { exposure, tone }
+    }
+}
+
 /// A render.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
@@ -102,9 +122,8 @@ pub struct RenderArguments {
     /// Tone-mapped picture.
     #[arg(long, value_name = "FILE.png", value_parser = png_file)]
     pub png: Option<PathBuf>,
-    /// Exposure of the PNG, in stops.
-    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
-    pub exposure: f32,
+    #[command(flatten)]
+    pub look: LookArguments,
     /// Radius of the camera's lens, in scene units, for depth of field [default: a pinhole].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     pub aperture: Option<f64>,
@@ -167,6 +186,9 @@ pub struct RenderArguments {
     /// Random numbers of paths [default: sobol, with --estimator ppm independent].
     #[arg(long, value_parser = choice::<Sampler>())]
     pub sampler: Option<Sampler>,
+    /// Pixel filter.
+    #[arg(long, default_value_t = RenderConfig::DEFAULT.filter, value_parser = choice::<PixelFilter>())]
+    pub filter: PixelFilter,
     /// Seed: the same seed on the same device gives the same picture, bit for bit (except with the paper's gathers that order
     /// photons by atomic counters).
     #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.seed)]
@@ -287,10 +309,13 @@ pub fn png_file(name: &str) -> Result<PathBuf, String> {
     }
 }
 
-pub fn exposure(text: &str) -> Result<f32, String> {
-    let stops = number(text)? as f32;
+fn exposure(text: &str) -> Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    let stops = number(text).map_err(|_| "expected a number of stops, or auto".to_owned())? as f32;
     if stops.abs() <= 100.0 {
-        Ok(stops)
+        Ok(Exposure::Stops(stops))
     } else {
         Err("must lie between -100 and 100".to_owned())
     }

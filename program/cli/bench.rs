@@ -6,6 +6,7 @@ use anyhow::{Context, Result, ensure};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory};
 
+use ppm_vk::Look;
 use ppm_vk::internals::film::{write_png, write_whole};
 use ppm_vk::internals::gather::{METHODS, method};
 use ppm_vk::internals::packing::SceneFeatures;
@@ -295,5 +296,5 @@ fn write_clusters(bench: &GatherBench, file: &Path) -> Result<()> {
     let cluster_grid = method("cluster-grid").context("no method cluster-grid")?;
     renderer.gather(cluster_grid, Probe::default())?;
     let picture = bench::cluster_picture(renderer)?;
-    Ok(write_png(&picture, file, 0.0)?)
+    Ok(write_png(&picture, file, Look::default())?)
 }

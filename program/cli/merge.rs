@@ -6,7 +6,7 @@ use anyhow::{Context, Error, Result};
 use clap::Args;
 
 use super::Outcome;
-use super::args::{exposure, exr_file, png_file};
+use super::args::{LookArguments, exr_file, png_file};
 use super::outputs::{all, check_outputs, named};
 use ppm_vk::internals::files::Writing;
 use ppm_vk::{Merge, Rendered, State};
@@ -23,9 +23,8 @@ pub struct MergeArguments {
     /// Tone-mapped picture.
     #[arg(long, value_name = "FILE.png", value_parser = png_file)]
     pub png: Option<PathBuf>,
-    /// Exposure of the PNG, in stops.
-    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = exposure)]
-    pub exposure: f32,
+    #[command(flatten)]
+    pub look: LookArguments,
     /// Write the sum, which can be merged with other parts.
     #[arg(long, value_name = "FILE", value_parser = named("state"))]
     pub state: Option<PathBuf>,
@@ -58,7 +57,7 @@ pub fn run(arguments: &MergeArguments) -> Result<Outcome> {
         arguments
             .png
             .as_ref()
-            .map(|png| rendered.write_png(png, arguments.exposure)),
+            .map(|png| rendered.write_png(png, arguments.look.into())),
         arguments.state.as_ref().map(|file| merge.state()?.write(file)),
     ];
     all(written

@@ -97,7 +97,6 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         rendered = session.render_with(until, &hooks);
     }
     bar.finish();
-    drop(hooks);
     if let Some(saver) = saver {
         saver.finish();
     }
@@ -151,7 +150,7 @@ fn write_outputs(arguments: &RenderArguments, output: &Path, rendered: &Rendered
     let written = [
         rendered.failure().map(|failure| Err(advice::of_failure(failure))),
         Some(picture.map_err(Error::from)),
-        png.map(|file| Ok(rendered.write_png(file, arguments.exposure)?)),
+        png.map(|file| Ok(rendered.write_png(file, arguments.look.into())?)),
         arguments
             .profile
             .then(|| super::print(&profile.table(subject)).map(|_| ())),
@@ -246,6 +245,7 @@ fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> Render
         emission: arguments.emission.unwrap_or(EmissionChoice::of(arguments.estimator)),
         sampler: arguments.sampler.unwrap_or(Sampler::of(arguments.estimator)),
         seed: arguments.seed,
+        filter: arguments.filter,
         part: arguments.part,
     }
 }

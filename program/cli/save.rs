@@ -10,7 +10,7 @@ use anyhow::{Error, Result};
 use super::advice;
 use super::args::RenderArguments;
 use super::outputs::all;
-use ppm_vk::{Snapshot, Snapshots};
+use ppm_vk::{Look, Snapshot, Snapshots};
 
 /// Time from one save to the next where a state is kept.
 const DEFAULT_EVERY: Duration = Duration::from_secs(60);
@@ -20,7 +20,7 @@ const DEFAULT_EVERY: Duration = Duration::from_secs(60);
 struct Files {
     exr: PathBuf,
     png: Option<PathBuf>,
-    exposure: f32,
+    look: Look,
     state: Option<PathBuf>,
 }
 
@@ -41,7 +41,7 @@ impl Saver {
         let files = Files {
             exr: output.to_owned(),
             png: arguments.png.clone(),
-            exposure: arguments.exposure,
+            look: arguments.look.into(),
             state: arguments.state.clone(),
         };
         // No queue: a snapshot that comes while the previous one is being written is left out.
@@ -92,7 +92,7 @@ impl Files {
         let rendered = &snapshot.rendered;
         let written = [
             Some(rendered.write_exr(&self.exr)),
-            self.png.as_ref().map(|png| rendered.write_png(png, self.exposure)),
+            self.png.as_ref().map(|png| rendered.write_png(png, self.look)),
             // Last: pictures are never older than the state.
             self.state
                 .as_ref()

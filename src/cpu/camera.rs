@@ -15,7 +15,7 @@ use super::surface::Surface;
 use super::texture::nearest_visible_culled;
 use super::vector::xyz;
 use super::{FAR, Inputs};
-use crate::config::Estimator;
+use crate::config::{Estimator, PixelFilter};
 use crate::layout::Settings;
 use crate::random::{CameraTurn, PathKind, Random};
 
@@ -95,7 +95,11 @@ pub fn trace_camera_path(inputs: &Inputs<'_>, pixel: [u32; 2], turn: CameraTurn,
     let has_lens = settings.camera_position[3] > 0.0;
     let lens = if has_lens { random.next4() } else { [0.0; 4] };
     let place = match inputs.config.estimator {
-        Estimator::Sppm => [x, y],
+        Estimator::Sppm if inputs.config.filter == PixelFilter::Box => [x, y],
+        Estimator::Sppm => {
+            let places = settings.filter_places.as_flattened();
+            [x, y].map(|number| 0.5 + PixelFilter::place(places, number))
+        }
         Estimator::Ppm => [0.5; 2],
     };
     let mut path = CameraPath::default();

@@ -1,22 +1,22 @@
 //! Pictures as PNG files, tone-mapped for viewing.
 
-use super::{Image, write_whole};
+use super::{Image, Look, write_whole};
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Writes an 8-bit sRGB PNG: radiance times 2^`exposure_ev`, the Khronos PBR Neutral tone mapper, the sRGB transfer
-/// function, rounding without dither.
+/// Writes an 8-bit sRGB PNG: radiance times 2 to the power of the exposure's stops, the tone mapper, the sRGB transfer function,
+/// rounding without dither.
 ///
 /// NaN and negative values become 0, infinity the brightest value.
 ///
 /// # Errors
 /// As [`check_writable`](super::check_writable); further if the disk is full.
-pub fn write_png(image: &Image, path: &Path, exposure_ev: f32) -> Result<()> {
-    let gain = exposure_ev.exp2();
+pub fn write_png(image: &Image, path: &Path, look: Look) -> Result<()> {
+    let gain = look.exposure.stops(image).exp2();
     let bytes: Vec<u8> = image
         .pixels
         .iter()
-        .flat_map(|pixel| tone_map(pixel.map(|radiance| radiance * gain)))
+        .flat_map(|pixel| look.tone.map(pixel.map(|radiance| radiance * gain)))
         .map(|intensity| (srgb_transfer(intensity) * 255.0).round() as u8)
         .collect();
     write_rgb8([image.width, image.height], &bytes, path)
@@ -43,37 +43,6 @@ pub fn write_rgb8(size: [usize; 2], bytes: &[u8], path: &Path) -> Result<()> {
     write_whole(path, &file)
 }
 
-/// Khronos PBR Neutral tone mapper (github.com/KhronosGroup/ToneMapping, PBR_Neutral): keeps hue and contrast up to
-/// 0.8, then compresses the peak channel towards 1 and desaturates. Maps any input to 0 ..= 1.
-fn tone_map(radiance: [f32; 3]) -> [f32; 3] {
-    const START_COMPRESSION: f32 = 0.8 - 0.04;
-    const DESATURATION: f32 = 0.15;
-    /// Replaces infinity: far above what a display distinguishes, far below the overflow of f32.
-    const BRIGHTEST: f32 = 1e20;
-
-    // NaN fails the comparison.
-    let color = radiance.map(|value| if value > 0.0 { value.min(BRIGHTEST) } else { 0.0 });
-    let darkest = color.into_iter().fold(BRIGHTEST, f32::min);
-    // Subtracts the reflection of a black dielectric at normal incidence, 0.04, from the shadows.
-    let offset = if darkest < 0.08 {
-        darkest - 6.25 * darkest * darkest
-    } else {
-        0.04
-    };
-    let color = color.map(|value| value - offset);
-    let peak = color.into_iter().fold(0.0, f32::max);
-    if peak < START_COMPRESSION {
-        return color;
-    }
-    let range = 1.0 - START_COMPRESSION;
-    let new_peak = 1.0 - range * range / (peak + range - START_COMPRESSION);
-    let whiteness = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
-    color.map(|value| {
-        let compressed = value * (new_peak / peak);
-        compressed + (new_peak - compressed) * whiteness
-    })
-}
-
 /// The transfer function of IEC 61966-2-1 (sRGB): linear intensity in 0 ..= 1 to the signal in 0 ..= 1.
 fn srgb_transfer(intensity: f32) -> f32 {
     if intensity <= 0.003_130_8 {
@@ -86,6 +55,7 @@ fn srgb_transfer(intensity: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Exposure;
     use std::fs;
 
     /// The 8-bit pixels of a picture's PNG.
@@ -93,7 +63,11 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("out.png");
         let image = Image::new(pixels.len(), 1, pixels);
-        write_png(&image, &path, exposure_ev).expect("a PNG file");
+        let look = Look {
+            exposure: Exposure::Stops(exposure_ev),
+            ..Look::default()
+        };
+        write_png(&image, &path, look).expect("a PNG file");
         let bytes = fs::read(path).expect("a file");
         let decoded = image::load_from_memory(&bytes).expect("a PNG").into_rgb8();
         decoded.pixels().map(|pixel| pixel.0).collect()

@@ -165,6 +165,8 @@ shared_constants! {
 
     /// Side of a tile in pixels: visible points are stored tile by tile.
     pub const TILE: u32 = 8;
+    /// Entries of a pixel filter's table.
+    pub const FILTER_PLACES: u32 = 64;
     /// Visible points per workgroup of the paper's orders: the workgroup size of `gather_*.comp`, and a cluster's run.
     pub const GROUP: u32 = 64;
     /// A filler in an order of visible points.

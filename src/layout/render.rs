@@ -8,7 +8,7 @@ use super::shape::{FieldLayout, Layout, Shared};
 
 device_structs! {
     /// Constants of a render. Lengths in render units.
-    pub struct Settings: 192 {
+    pub struct Settings: 448 {
         /// xyz: centre of projection; w: radius of the lens.
         pub camera_position: [f32; 4],
         /// xyz: to the picture's right edge, at distance 1; w: focal distance along the direction of view.
@@ -69,6 +69,8 @@ device_structs! {
         pub padding2: u32,
         /// The media that the camera is in, sorted; 2³² − 1 in unused entries.
         pub camera_media: [u32; 4],
+        /// Distances from a pixel's centre, in pixels: `PixelFilter::places`.
+        pub filter_places: [[f32; 4]; FILTER_PLACES as usize / 4],
     }
 
     /// A visible point: the paper's hitpoint.

@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use crate::config::{Accel, Direct, Estimator, RenderConfig, SEQUENCES, Totals, TriangleTest, iterations_of};
+use crate::config::{
+    Accel, Direct, Estimator, PixelFilter, RenderConfig, SEQUENCES, Totals, TriangleTest, iterations_of,
+};
 use crate::gather::{METHODS, Record, default_method, grid_sizes, scan};
 use crate::packing::SceneFeatures;
 use crate::random::CameraTurn;
@@ -217,6 +219,7 @@ impl Stages<'_> {
             ("SAMPLER", self.config.sampler as u32),
             ("SLOTS", self.sizes.slots_per_pixel),
             ("JITTER", u32::from(self.config.estimator == Estimator::Sppm)),
+            ("FILTERED", u32::from(self.config.filter != PixelFilter::Box)),
             ("DROP_UNWANTED", u32::from(self.config.drops_unwanted())),
             ("AIMED", u32::from(self.sizes.aimed)),
             ("SAMPLE_LIGHTS", u32::from(self.config.direct == Direct::Light)),

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 #[cfg(test)]
 use crate::estimate::OnePhoton;
 use crate::estimate::{ErrorEstimate, RelativeError};
-use crate::film::{self, Image, Layers, Metadata};
+use crate::film::{self, Image, Layers, Look, Metadata};
 use crate::report::{Profile, Subject};
 
 /// The failure that ended a render early.
@@ -201,11 +201,11 @@ impl Rendered {
         film::write_exr(self.image(), layers, path, &self.0.metadata)
     }
 
-    /// Writes a tone-mapped PNG, with an exposure in stops.
+    /// Writes a tone-mapped PNG.
     ///
     /// # Errors
     /// As [`Rendered::write_exr`].
-    pub fn write_png(&self, path: &Path, exposure: f32) -> Result<()> {
-        film::write_png(self.image(), path, exposure)
+    pub fn write_png(&self, path: &Path, look: Look) -> Result<()> {
+        film::write_png(self.image(), path, look)
     }
 }

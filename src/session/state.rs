@@ -112,6 +112,7 @@ fn named(config: &RenderConfig) -> BTreeMap<String, String> {
         aims_anyway,
         sampler,
         seed,
+        filter,
         part: _, // part of the identity by itself
     } = config;
     let or_automatic = |value: Option<String>| value.unwrap_or_else(|| "automatic".to_owned());
@@ -138,6 +139,7 @@ fn named(config: &RenderConfig) -> BTreeMap<String, String> {
         ("aims_anyway", aims_anyway.to_string()),
         ("sampler", sampler.to_string()),
         ("seed", seed.to_string()),
+        ("filter", filter.to_string()),
     ];
     settings.map(|(name, value)| (name.to_owned(), value)).into()
 }

@@ -7,7 +7,7 @@ use std::sync::Once;
 
 use ppm_vk::internals::backend::Backend;
 use ppm_vk::internals::config::RenderConfig;
-use ppm_vk::internals::film::{Image, read_exr, write_png};
+use ppm_vk::internals::film::{Image, Look, read_exr, write_png};
 use ppm_vk::internals::gpu::Device;
 use ppm_vk::internals::metrics::{Defects, defects};
 use ppm_vk::internals::packing::PackedScene;
@@ -62,7 +62,7 @@ fn write_remembered() {
         let path = folder.join(format!("{test}-{number}-{name}.png"));
         let written = std::fs::create_dir_all(&folder)
             .map_err(|error| error.to_string())
-            .and_then(|()| write_png(image, &path, 0.0).map_err(|error| error.to_string()));
+            .and_then(|()| write_png(image, &path, Look::default()).map_err(|error| error.to_string()));
         match written {
             Ok(()) => eprintln!("picture: {}", path.display()),
             Err(error) => eprintln!("{}: {error}", path.display()),
