@@ -10,7 +10,7 @@ use super::PreparedScene;
 use super::merge::{PictureOfPart, put_picture};
 use super::rendered::About;
 use crate::backend::{Backend, Resolved, settings};
-use crate::config::{Part, RenderConfig};
+use crate::config::{Accel, Part, RenderConfig};
 use crate::error::{Error, Result};
 use crate::gather::METHODS;
 use crate::pipeline::scene_buffers;
@@ -33,8 +33,12 @@ pub(super) struct Identity {
 impl Identity {
     pub fn of(scene: &PreparedScene, camera: &Camera, config: &RenderConfig, is_cpu: bool) -> Self {
         let packed = scene.packed();
+        let by_bvh = RenderConfig {
+            accel: Accel::Bvh,
+            ..config.clone()
+        };
         let mut content = blake3::Hasher::new();
-        for (id, bytes) in scene_buffers(packed, config) {
+        for (id, bytes) in scene_buffers(packed, &by_bvh) {
             content.update(format!("{id:?} {}", bytes.len()).as_bytes());
             content.update(bytes);
         }
