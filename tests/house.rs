@@ -156,7 +156,16 @@ fn functions_that_kernels_call_in_loops_return_once() {
 }
 
 /// What only the program needs.
-const OF_THE_PROGRAM: [&str; 6] = ["anyhow", "clap", "ctrlc", "indicatif", "plotters", "signal-hook"];
+const OF_THE_PROGRAM: [&str; 8] = [
+    "anyhow",
+    "clap",
+    "clap_complete",
+    "clap_mangen",
+    "ctrlc",
+    "indicatif",
+    "plotters",
+    "signal-hook",
+];
 
 #[test]
 fn the_library_builds_without_the_programs_dependencies() {

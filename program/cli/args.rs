@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::bench::{BenchFeatures, BenchGather, BenchKernels, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
+use super::manual::Manual;
 use super::merge::MergeArguments;
 use super::outputs::named;
 use super::scene::SceneArguments;
@@ -57,6 +58,8 @@ pub enum Command {
     Compare(Compare),
     /// Merge the states of parts (--part K/N --state FILE) into a picture.
     Merge(MergeArguments),
+    /// Write manual pages and completions for bash, zsh and fish.
+    Manual(Manual),
     /// Show the contents of a scene.
     Inspect {
         /// glTF file (.gltf or .glb).

@@ -17,6 +17,7 @@ mod compare;
 mod converge;
 mod interrupt;
 mod list;
+mod manual;
 mod merge;
 mod outputs;
 mod progress;
@@ -57,6 +58,7 @@ pub fn run() -> Result<Outcome> {
         Some(Command::Bench(args::Bench::Kernels(arguments))) => bench::kernels(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Converge(arguments)) => converge::run(&arguments),
+        Some(Command::Manual(arguments)) => manual::run(&arguments),
         Some(Command::Merge(arguments)) => merge::run(&arguments),
         Some(Command::Gathers) => print(&list::gathers()?),
         Some(Command::Inspect { scene, read, json }) => print(&list::inspect(&scene, &read, json)?),
