@@ -102,6 +102,32 @@ fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
 }
 
 #[test]
+fn manual_writes_a_page_for_every_command_and_completions() {
+    let folder = TempDir::new().expect("folder");
+    let output = ppm_vk(folder.path(), &["manual", "."]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let written = files(folder.path());
+    let commands = [
+        "merge",
+        "compare",
+        "converge",
+        "inspect",
+        "devices",
+        "gathers",
+        "bench-gather",
+    ];
+    let pages = commands.map(|command| format!("ppm-vk-{command}.1"));
+    let others = ["ppm-vk.1", "ppm-vk.bash", "_ppm-vk", "ppm-vk.fish"].map(str::to_owned);
+    for name in pages.into_iter().chain(others) {
+        assert!(written.contains(&name), "no {name} among {written:?}");
+    }
+    let page = std::fs::read_to_string(folder.path().join("ppm-vk.1")).expect("page");
+    assert!(page.contains("\\-\\-target\\-error"), "a flag is missing:\n{page}");
+    let output = ppm_vk(folder.path(), &["manual", "nowhere"]);
+    assert_fails(&folder, &output, &["nowhere"]);
+}
+
+#[test]
 fn profiles_and_traces_list_every_stage() {
     let folder = TempDir::new().expect("folder");
     let more = [
