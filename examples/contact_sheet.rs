@@ -1,7 +1,10 @@
-//! Combines PNGs of one size into a contact sheet: `cargo run --example contact_sheet -- SHEET.png PICTURE.png ...`
+//! Combines pictures of one size, PNG or OpenEXR, into a contact sheet: `cargo run --example contact_sheet -- SHEET.png PICTURE...`
+
+use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use image::{GenericImage, RgbImage};
+use ppm_vk::internals::film;
 
 /// Pixels between pictures.
 const GAP: u32 = 4;
@@ -11,12 +14,8 @@ fn main() -> Result<()> {
     let sheet = arguments.next().context("name the sheet to write, then its pictures")?;
     let mut pictures = Vec::new();
     for name in arguments {
-        let name = std::path::PathBuf::from(name);
-        pictures.push(
-            image::open(&name)
-                .with_context(|| name.display().to_string())?
-                .into_rgb8(),
-        );
+        let name = Path::new(&name);
+        pictures.push(open(name).with_context(|| name.display().to_string())?);
     }
     let first = pictures.first().context("name the pictures after the sheet")?;
     let (width, height) = first.dimensions();
@@ -37,4 +36,15 @@ fn main() -> Result<()> {
     }
     whole.save(&sheet)?;
     Ok(())
+}
+
+/// A picture as it is shown: OpenEXR with the program's tone mapping.
+fn open(name: &Path) -> Result<RgbImage> {
+    if name.extension().is_none_or(|extension| extension != "exr") {
+        return Ok(image::open(name)?.into_rgb8());
+    }
+    let folder = tempfile::tempdir()?;
+    let shown = folder.path().join("shown.png");
+    film::write_png(&film::read_exr(name)?, &shown, 0.0)?;
+    Ok(image::open(shown)?.into_rgb8())
 }
