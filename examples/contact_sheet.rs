@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use image::{GenericImage, RgbImage};
+use ppm_vk::Look;
 use ppm_vk::internals::film;
 
 /// Pixels between pictures.
@@ -45,6 +46,6 @@ fn open(name: &Path) -> Result<RgbImage> {
     }
     let folder = tempfile::tempdir()?;
     let shown = folder.path().join("shown.png");
-    film::write_png(&film::read_exr(name)?, &shown, 0.0)?;
+    film::write_png(&film::read_exr(name)?, &shown, Look::default())?;
     Ok(image::open(shown)?.into_rgb8())
 }
