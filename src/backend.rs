@@ -13,6 +13,16 @@ use crate::record::Run;
 use crate::scene::{Camera, Lens, Projection};
 use crate::state::Blocks;
 
+/// What a session does before its first iteration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Phase {
+    /// It uploads the scene and compiles the kernels.
+    Compile,
+    /// It finds the first visible points, where photons are needed, and the radii.
+    Pilot,
+}
+
 /// A progressive render.
 pub trait Backend {
     /// Runs one iteration; returns the times of its stages.

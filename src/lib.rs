@@ -79,7 +79,7 @@ mod stage;
 mod state;
 mod text;
 
-pub use backend::{Counters, DeviceDescription};
+pub use backend::{Counters, DeviceDescription, Phase};
 pub use config::{
     Accel, Choice, Direct, EmissionChoice, Estimator, Part, PixelFilter, RenderConfig, Sampler, TriangleTest,
 };
@@ -91,9 +91,9 @@ pub use loader::{LightUnits, LoadOptions};
 pub use metrics::{Comparison, compare, flip};
 pub use pipeline::Memory;
 pub use record::Run;
-pub use report::{Profile, Subject};
+pub use report::{Profile, StageTimes, Subject};
 pub use scene::{Camera, Environment, Lens, LoadChoice, Remark, Scene};
 pub use session::{
     Failure, Hooks, Merge, Platform, PreparedScene, Progress, Rendered, Session, Snapshot, Snapshots, State, Until,
-    Warning,
+    Wanted, Warning,
 };

@@ -68,6 +68,44 @@ pub struct Subject {
     pub counters: Counters,
 }
 
+/// The total times of stages, in the order of their first launch: unlike a [`Profile`], they take little memory in long renders.
+#[derive(Debug, Clone, Default)]
+pub struct StageTimes(Vec<StageTime>);
+
+/// The total time of a stage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StageTime {
+    /// The stage.
+    pub stage: &'static str,
+    /// Number of launches.
+    pub launches: u64,
+    /// All launches together, in microseconds.
+    pub total_us: f64,
+}
+
+impl StageTimes {
+    /// Adds the launches of an iteration.
+    pub fn add(&mut self, run: &Run) {
+        for Launch { stage, duration_ns, .. } in &run.launches {
+            let at = self.0.iter().position(|time| time.stage == *stage).unwrap_or_else(|| {
+                self.0.push(StageTime {
+                    stage,
+                    launches: 0,
+                    total_us: 0.0,
+                });
+                self.0.len() - 1
+            });
+            self.0[at].launches += 1;
+            self.0[at].total_us += duration_ns * 1e-3;
+        }
+    }
+
+    /// The stages.
+    pub fn stages(&self) -> &[StageTime] {
+        &self.0
+    }
+}
+
 impl Profile {
     /// Adds an iteration that began at this time after the start of the render.
     pub fn add(&mut self, began: Duration, run: Run) {

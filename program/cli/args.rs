@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::bench::{BenchFeatures, BenchGather, BenchKernels, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
+use super::events::ProgressFormat;
 use super::manual::Manual;
 use super::merge::MergeArguments;
 use super::outputs::named;
@@ -225,6 +226,10 @@ pub struct RenderArguments {
     /// render of N·n. Needs --state.
     #[arg(long, value_name = "K/N", requires = "state", default_value_t = Part::WHOLE, hide_default_value = true, value_parser = part)]
     pub part: Part,
+    /// Tell of progress on stdout, as a JSON line for each event, instead of a bar (docs/watching.md). --profile then prints to
+    /// stderr, and nothing with --profile-json.
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub progress: Option<ProgressFormat>,
     /// No progress bar.
     #[arg(long)]
     pub quiet: bool,

@@ -15,6 +15,7 @@ mod args;
 mod bench;
 mod compare;
 mod converge;
+mod events;
 mod interrupt;
 mod list;
 mod manual;
@@ -24,6 +25,8 @@ mod progress;
 mod render;
 mod save;
 mod scene;
+mod takers;
+mod watch;
 
 use std::io::Write as _;
 

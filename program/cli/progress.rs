@@ -7,20 +7,57 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use ppm_vk::{Progress, Until};
+use super::events::{Event, Iteration, Listener, Phase};
+use ppm_vk::{Progress, Session, Until};
 
-/// A bar on stderr; nothing if stderr is no terminal.
-pub struct Bar {
-    bar: ProgressBar,
+/// Measures a render.
+pub struct Meter {
     until: Until,
     start: Instant,
+    /// Iterations and photon paths before the start.
+    iterations: u32,
+    emitted: u64,
 }
+
+impl Meter {
+    /// Of a render that begins now.
+    pub fn new(until: Until, session: &Session) -> Self {
+        Self {
+            until,
+            start: Instant::now(),
+            iterations: session.iterations(),
+            emitted: session.photons_emitted(),
+        }
+    }
+
+    /// The state after an iteration.
+    pub fn measure(&self, progress: Progress) -> Iteration {
+        let seconds = self.start.elapsed().as_secs_f64().max(1e-9);
+        let of_before = |limit| f64::from(self.iterations) / f64::from(limit);
+        let before = self.until.iterations.map_or(0.0, of_before);
+        let done = progress.done - before;
+        let emitted = progress.photons_emitted.saturating_sub(self.emitted);
+        Iteration {
+            iteration: progress.iterations,
+            iterations: self.until.iterations,
+            share: progress.done,
+            rendering_seconds: seconds,
+            seconds_left: (done > 0.0).then(|| seconds * (1.0 - progress.done) / done),
+            photons_emitted: progress.photons_emitted,
+            photons_per_second: emitted as f64 / seconds,
+            estimated_error: progress.error,
+        }
+    }
+}
+
+/// A bar on stderr; nothing if stderr is no terminal.
+pub struct Bar(ProgressBar);
 
 const STEPS: u64 = 1000;
 
 impl Bar {
-    /// A bar for a render that begins now; invisible if `quiet`.
-    pub fn new(until: Until, quiet: bool) -> Self {
+    /// A bar that appears with the first iteration; never if `quiet`.
+    pub fn new(quiet: bool) -> Self {
         let target = if quiet {
             ProgressDrawTarget::hidden()
         } else {
@@ -30,36 +67,33 @@ impl Bar {
         if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} % {msg}") {
             bar.set_style(style);
         }
-        Self {
-            bar,
-            until,
-            start: Instant::now(),
-        }
+        Self(bar)
     }
 
-    /// Shows the progress of the render.
-    pub fn show(&self, progress: Progress) {
-        let Progress {
-            iterations,
-            photons_emitted,
-            error,
-            done,
-        } = progress;
-        self.bar.set_position((done * STEPS as f64) as u64);
-        let seconds = self.start.elapsed().as_secs_f64().max(1e-9);
-        let of = self.until.iterations.map_or(String::new(), |limit| format!("/{limit}"));
-        let left = if done > 0.0 { seconds * (1.0 - done) / done } else { 0.0 };
-        let error = error.map_or(String::new(), |error| format!(", error about {:.1} %", 100.0 * error));
-        self.bar.set_message(format!(
-            "{iterations}{of} iterations{error}, {} photon paths/s, {} left",
-            with_prefix(photons_emitted as f64 / seconds),
-            clock(left)
+    fn show(&self, state: &Iteration) {
+        self.0.set_position((state.share * STEPS as f64) as u64);
+        let of = state.iterations.map_or(String::new(), |limit| format!("/{limit}"));
+        let error = state
+            .estimated_error
+            .map_or(String::new(), |error| format!(", error about {:.1} %", 100.0 * error));
+        let left = state
+            .seconds_left
+            .map_or(String::new(), |left| format!(", {} left", clock(left)));
+        self.0.set_message(format!(
+            "{}{of} iterations{error}, {} photon paths/s{left}",
+            state.iteration,
+            with_prefix(state.photons_per_second),
         ));
     }
+}
 
-    /// Removes the bar.
-    pub fn finish(&self) {
-        self.bar.finish_and_clear();
+impl Listener for Bar {
+    fn hear(&self, event: &Event, _: f64) {
+        match event {
+            Event::Iteration(state) => self.show(state),
+            Event::Phase { phase: Phase::Write } | Event::Error { .. } => self.0.finish_and_clear(),
+            _ => {}
+        }
     }
 }
 

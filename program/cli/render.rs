@@ -1,6 +1,7 @@
 //! Renders a scene to files.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, Error, Result};
 use clap::CommandFactory;
@@ -11,15 +12,16 @@ use ppm_vk::internals::files::Writing;
 use ppm_vk::internals::film;
 use ppm_vk::internals::gather::{self, METHODS, Runs};
 use ppm_vk::{
-    Camera, EmissionChoice, Estimator, Hooks, Platform, PreparedScene, RenderConfig, Rendered, Sampler, Session, State,
-    Until, Warning,
+    Camera, EmissionChoice, Estimator, Hooks, Platform, PreparedScene, RenderConfig, Rendered, Sampler, Scene, Session,
+    Snapshots, State, Until, Warning,
 };
 
 use super::args::{Arguments, BackendChoice, RenderArguments};
+use super::events::{Event, Events, Phase};
 use super::outputs::{all, check_outputs};
-use super::progress::{BUILDING, Bar, while_showing, with_prefix};
-use super::save::Saver;
-use super::scene::say_remarks;
+use super::progress::{BUILDING, Meter, while_showing, with_prefix};
+use super::scene::tell_remarks;
+use super::watch::Watch;
 use super::{Outcome, advice, interrupt};
 
 /// Default number of iterations, without a time limit.
@@ -30,16 +32,126 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let path = arguments.scene.as_deref().context("--scene is missing")?;
     let (platform, gather) = choose_platform(arguments);
     let output = arguments.output.clone().unwrap_or_else(|| default_output(path));
-    // Before any work: fail early if a picture can't be written.
-    check_outputs(&arguments.read.inputs(path), outputs(arguments, &output))?;
-    interrupt::install()?;
+    let watch = Watch::new(arguments, &output);
+    let job = Job {
+        arguments,
+        path,
+        output: &output,
+        platform,
+        gather,
+        watch: &watch,
+    };
+    let outcome = job.run();
+    watch.end(&outcome);
+    outcome
+}
 
-    let quiet = arguments.quiet;
-    let scene = arguments.read.load(path, quiet)?;
-    let mut inputs = arguments.read.inputs(path);
-    inputs.extend(scene.files.iter().map(PathBuf::as_path));
-    check_outputs(&inputs, outputs(arguments, &output))?;
-    say_remarks(&scene);
+/// A render of a scene's file.
+struct Job<'a> {
+    arguments: &'a RenderArguments,
+    path: &'a Path,
+    output: &'a Path,
+    platform: Platform,
+    gather: usize,
+    watch: &'a Watch<'a>,
+}
+
+impl Job<'_> {
+    fn run(&self) -> Result<Outcome> {
+        let Self {
+            arguments,
+            path,
+            output,
+            gather,
+            watch,
+            ref platform,
+        } = *self;
+        let events = &watch.events;
+        // Before any work: fail early if a picture can't be written.
+        check_outputs(&arguments.read.inputs(path), outputs(arguments, output))?;
+        interrupt::install()?;
+
+        let quiet = arguments.quiet || arguments.has_events_on_stdout();
+        events.begin(Phase::Load);
+        let scene = arguments.read.load(path, quiet)?;
+        let mut inputs = arguments.read.inputs(path);
+        inputs.extend(scene.files.iter().map(PathBuf::as_path));
+        check_outputs(&inputs, outputs(arguments, output))?;
+        tell_remarks(&scene, events);
+        let camera = camera(arguments, &scene)?;
+        let config = config(arguments, gather, &camera);
+        events.begin(Phase::Build);
+        let prepared = while_showing(BUILDING, quiet, || PreparedScene::new(&scene))?;
+        for note in prepared.notes() {
+            events.note(note.clone());
+        }
+        let begins = |phase: ppm_vk::Phase| match phase {
+            ppm_vk::Phase::Compile => events.begin(Phase::Compile),
+            ppm_vk::Phase::Pilot => events.begin(Phase::Pilot),
+            _ => {}
+        };
+        let open = || Session::watched(&prepared, &camera, &config, platform, &begins);
+        let mut session = open()?;
+        tell_warnings(events, session.warnings());
+        if let Some(state) = &arguments.state {
+            begin_with_state(events, &mut session, state, arguments.resume)?;
+        }
+        if arguments.radius.is_none() {
+            say!("initial radius {:.6} scene units (automatic)", session.radius());
+        }
+        if config.emission == EmissionChoice::Aimed && !session.is_aimed() {
+            say!(
+                "photon paths start in proportion to the lights' power: aiming does not pay for its cost in this scene"
+            );
+        }
+
+        let until = until(arguments);
+        let takers = watch.takers();
+        let meter = Meter::new(until, &session);
+        let hooks = Hooks {
+            stop: &interrupt::requested,
+            progress: &|progress| events.tell(&Event::Iteration(meter.measure(progress))),
+            profile: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
+            snapshots: Some(Snapshots {
+                wanted: &|| takers.want(),
+                take: &|snapshot| takers.take(&snapshot),
+            }),
+        };
+        events.begin(Phase::Iterate);
+        let mut rendered = session.render_with(until, &hooks);
+        if let Some(state) = arguments.state.as_deref().filter(|_| is_device_lost(&rendered)) {
+            events.warning(format!(
+                "the device was lost; the render goes on from {} on a device that is opened anew",
+                state.display()
+            ));
+            session = open()?;
+            session.resume(&State::read(state)?)?;
+            events.begin(Phase::Iterate);
+            rendered = session.render_with(until, &hooks);
+        }
+        events.begin(Phase::Write);
+        let rendered = rendered.map(Arc::new);
+        takers.end(rendered.as_ref().ok());
+        let rendered = rendered?;
+        tell_warnings(events, &rendered.warnings());
+        let state = arguments.state.as_ref().filter(|_| rendered.failure().is_none());
+        let state = state.map(|file| {
+            session.state()?.write(file)?;
+            events.written(file, session.iterations());
+            Ok(())
+        });
+        all([write_outputs(arguments, events, output, &rendered)]
+            .into_iter()
+            .chain(state))?;
+        Ok(if interrupt::requested() {
+            Outcome::Interrupted
+        } else {
+            Outcome::Done
+        })
+    }
+}
+
+fn camera(arguments: &RenderArguments, scene: &Scene) -> Result<Camera> {
     let mut camera = scene.cameras[scene.camera_index(arguments.camera.as_deref())?].clone();
     if let Some(radius) = arguments.aperture {
         camera.lens = Some(scene.lens(&camera, radius, arguments.focus)?);
@@ -47,83 +159,30 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     if let Some([x, y]) = arguments.shift {
         camera.shift = Vec2::new(x, y);
     }
-    let config = config(arguments, gather, &camera);
-    let prepared = while_showing(BUILDING, quiet, || PreparedScene::new(&scene))?;
-    for note in prepared.notes() {
-        say!("note: {note}");
-    }
-    let open = || Session::new(&prepared, &camera, &config, &platform);
-    let mut session = open()?;
-    say_warnings(session.warnings());
-    if let Some(state) = &arguments.state {
-        begin_with_state(&mut session, state, arguments.resume)?;
-    }
-    if arguments.radius.is_none() {
-        say!("initial radius {:.6} scene units (automatic)", session.radius());
-    }
-    if config.emission == EmissionChoice::Aimed && !session.is_aimed() {
-        say!("photon paths start in proportion to the lights' power: aiming does not pay for its cost in this scene");
-    }
+    Ok(camera)
+}
 
-    let until = Until {
-        iterations: arguments.iterations.or_else(|| {
-            let endless = arguments.time.is_none() && arguments.target_error.is_none();
-            endless.then_some(DEFAULT_ITERATIONS)
-        }),
+fn until(arguments: &RenderArguments) -> Until {
+    let endless = arguments.time.is_none() && arguments.target_error.is_none();
+    Until {
+        iterations: arguments.iterations.or_else(|| endless.then_some(DEFAULT_ITERATIONS)),
         time: arguments.time,
         error: arguments.target_error,
-    };
-    let saver = Saver::new(arguments, &output);
-    let save = |snapshot| {
-        if let Some(saver) = &saver {
-            saver.save(snapshot);
-        }
-    };
-    let bar = Bar::new(until, quiet);
-    let hooks = Hooks {
-        stop: &interrupt::requested,
-        progress: &|progress| bar.show(progress),
-        profile: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
-        snapshots: saver.as_ref().map(|saver| saver.snapshots(&save)),
-    };
-    let mut rendered = session.render_with(until, &hooks);
-    if let Some(state) = arguments.state.as_deref().filter(|_| is_device_lost(&rendered)) {
-        say!(
-            "warning: the device was lost; the render goes on from {} on a device that is opened anew",
-            state.display()
-        );
-        session = open()?;
-        session.resume(&State::read(state)?)?;
-        rendered = session.render_with(until, &hooks);
     }
-    bar.finish();
-    if let Some(saver) = saver {
-        saver.finish();
-    }
-    let rendered = rendered?;
-    say_warnings(&rendered.warnings());
-    let state = arguments.state.as_ref().filter(|_| rendered.failure().is_none());
-    let state = state.map(|file| Ok(session.state()?.write(file)?));
-    all([write_outputs(arguments, &output, &rendered)].into_iter().chain(state))?;
-    Ok(if interrupt::requested() {
-        Outcome::Interrupted
-    } else {
-        Outcome::Done
-    })
 }
 
 /// Goes on from a state, if that is asked for and there is one.
-fn begin_with_state(session: &mut Session, file: &Path, resume: bool) -> Result<()> {
+fn begin_with_state(events: &Events, session: &mut Session, file: &Path, resume: bool) -> Result<()> {
     if !file.exists() {
         if resume {
-            say!("note: there is no {} yet: the render begins", file.display());
+            events.note(format!("there is no {} yet: the render begins", file.display()));
         }
     } else if resume {
         let state = State::read(file)?;
         session.resume(&state).with_context(|| file.display().to_string())?;
         say!("{}: going on after {} iterations", file.display(), session.iterations());
     } else {
-        say!("note: {} will be replaced; --resume goes on from it", file.display());
+        events.note(format!("{} will be replaced; --resume goes on from it", file.display()));
     }
     Ok(())
 }
@@ -137,33 +196,53 @@ fn is_device_lost(rendered: &ppm_vk::Result<Rendered>) -> bool {
 ///
 /// # Errors
 /// All failures, including that of the render, in one line.
-fn write_outputs(arguments: &RenderArguments, output: &Path, rendered: &Rendered) -> Result<()> {
+fn write_outputs(arguments: &RenderArguments, events: &Events, output: &Path, rendered: &Rendered) -> Result<()> {
     let _writing = Writing::begin();
-    let picture = rendered.write_exr(output);
+    let tell = |written: Result<()>, file: &Path| written.map(|()| events.written(file, rendered.iterations()));
+    let picture = tell(rendered.write_exr(output).map_err(Error::from), output);
     if picture.is_ok() {
         say_rendered(output, rendered);
     }
     let (png, profile, subject) = (arguments.png.as_ref(), rendered.profile(), rendered.subject());
     let json = |file: &Option<PathBuf>, value: &dyn Fn() -> serde_json::Value| {
-        file.as_ref().map(|file| write_json(file, &value()))
+        file.as_ref().map(|file| tell(write_json(file, &value()), file))
     };
     let written = [
         rendered.failure().map(|failure| Err(advice::of_failure(failure))),
-        Some(picture.map_err(Error::from)),
-        png.map(|file| Ok(rendered.write_png(file, arguments.look.into())?)),
-        arguments
-            .profile
-            .then(|| super::print(&profile.table(subject)).map(|_| ())),
+        Some(picture),
+        png.map(|file| {
+            let written = rendered.write_png(file, arguments.look.into());
+            tell(written.map_err(Error::from), file)
+        }),
+        arguments.profile.then(|| print_profile(arguments, rendered)),
         json(&arguments.profile_json, &|| profile.json(subject)),
         json(&arguments.trace, &|| profile.trace(subject)),
     ];
     all(written.into_iter().flatten())
 }
 
-fn say_warnings(warnings: &[Warning]) {
+/// Prints the profile to stdout; where that has events only, to stderr, unless it goes to a file.
+fn print_profile(arguments: &RenderArguments, rendered: &Rendered) -> Result<()> {
+    let table = rendered.profile().table(rendered.subject());
+    if !arguments.has_events_on_stdout() {
+        return super::print(&table).map(|_| ());
+    }
+    if arguments.profile_json.is_none() {
+        for line in table.lines() {
+            say!("{line}");
+        }
+    }
+    Ok(())
+}
+
+fn tell_warnings(events: &Events, warnings: &[Warning]) {
     for warning in warnings {
-        let kind = if warning.is_slight() { "note" } else { "warning" };
-        say!("{kind}: {}", advice::of_warning(warning));
+        let text = advice::of_warning(warning);
+        if warning.is_slight() {
+            events.note(text);
+        } else {
+            events.warning(text);
+        }
     }
 }
 

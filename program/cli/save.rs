@@ -1,7 +1,7 @@
 //! Pictures and states that are written while a render goes on.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -9,8 +9,10 @@ use anyhow::{Error, Result};
 
 use super::advice;
 use super::args::RenderArguments;
+use super::events::Events;
 use super::outputs::all;
-use ppm_vk::{Look, Snapshot, Snapshots};
+use super::takers::{Mailbox, Pace, Taker};
+use ppm_vk::{Look, Rendered, Snapshot, Wanted};
 
 /// Time from one save to the next where a state is kept.
 const DEFAULT_EVERY: Duration = Duration::from_secs(60);
@@ -26,15 +28,15 @@ struct Files {
 
 /// Writes snapshots on a thread of its own, so that the render goes on meanwhile.
 pub struct Saver {
-    every: Duration,
-    with_state: bool,
-    snapshots: SyncSender<Snapshot>,
+    pace: Pace,
+    wanted: Wanted,
+    snapshots: Arc<Mailbox<Snapshot>>,
     thread: JoinHandle<()>,
 }
 
 impl Saver {
     /// For a render with these arguments; `None` if it saves nothing.
-    pub fn new(arguments: &RenderArguments, output: &Path) -> Option<Self> {
+    pub fn new(arguments: &RenderArguments, output: &Path, events: &Arc<Events>) -> Option<Self> {
         let every = arguments
             .save_every
             .or(arguments.state.is_some().then_some(DEFAULT_EVERY))?;
@@ -44,64 +46,66 @@ impl Saver {
             look: arguments.look.into(),
             state: arguments.state.clone(),
         };
-        // No queue: a snapshot that comes while the previous one is being written is left out.
-        let (snapshots, taken) = sync_channel(0);
+        let snapshots = Arc::new(Mailbox::default());
+        let (incoming, events) = (snapshots.clone(), events.clone());
         let thread = thread::spawn(move || {
-            for snapshot in taken {
-                if let Err(error) = files.write(&snapshot) {
-                    say!(
-                        "warning: {}; the render goes on, and the files are those of the save before",
+            while let Some(snapshot) = incoming.next() {
+                if let Err(error) = files.write(&snapshot, &events) {
+                    events.warning(format!(
+                        "{}; the render goes on, and the files are those of the save before",
                         advice::line(&error)
-                    );
+                    ));
                 }
             }
         });
         Some(Self {
-            every,
-            with_state: arguments.state.is_some(),
+            pace: Pace::every(every),
+            wanted: if arguments.state.is_some() {
+                Wanted::State
+            } else {
+                Wanted::Picture
+            },
             snapshots,
             thread,
         })
     }
+}
 
-    /// The snapshots that it asks for.
-    pub fn snapshots<'a>(&self, take: &'a dyn Fn(Snapshot)) -> Snapshots<'a> {
-        Snapshots {
-            every: self.every,
-            with_state: self.with_state,
-            take,
-        }
+impl Taker for Saver {
+    fn wants(&self) -> Option<Wanted> {
+        (self.pace.is_due() && self.snapshots.is_awaited()).then_some(self.wanted)
     }
 
-    /// Writes a snapshot, unless the previous one is still being written.
-    pub fn save(&self, snapshot: Snapshot) {
-        // The thread waits for snapshots until `finish`.
-        let _ = self.snapshots.try_send(snapshot);
+    fn take(&self, snapshot: &Snapshot) {
+        self.pace.taken(snapshot.cost);
+        self.snapshots.put(snapshot.clone());
     }
 
-    /// Waits for the last write.
-    pub fn finish(self) {
-        drop(self.snapshots);
+    /// Waits for the last write: the last picture is written after it.
+    fn end(self: Box<Self>, _: Option<&Arc<Rendered>>) {
+        self.snapshots.close();
         // A panic there has been told by its own message.
         let _ = self.thread.join();
     }
 }
 
 impl Files {
-    fn write(&self, snapshot: &Snapshot) -> Result<()> {
+    fn write(&self, snapshot: &Snapshot, events: &Events) -> Result<()> {
         let rendered = &snapshot.rendered;
+        let tell = |written: ppm_vk::Result<()>, file: &Path| {
+            written
+                .map(|()| events.written(file, rendered.iterations()))
+                .map_err(Error::from)
+        };
+        let (png, state) = (self.png.as_deref(), self.state.as_deref());
         let written = [
-            Some(rendered.write_exr(&self.exr)),
-            self.png.as_ref().map(|png| rendered.write_png(png, self.look)),
+            Some(tell(rendered.write_exr(&self.exr), &self.exr)),
+            png.map(|file| tell(rendered.write_png(file, self.look), file)),
             // Last: pictures are never older than the state.
-            self.state
-                .as_ref()
+            state
                 .zip(snapshot.state.as_ref())
-                .map(|(file, state)| state.write(file)),
+                .map(|(file, state)| tell(state.write(file), file)),
         ];
-        all(written
-            .into_iter()
-            .flatten()
-            .map(|written| written.map_err(Error::from)))
+        all(written.into_iter().flatten())
     }
 }

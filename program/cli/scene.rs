@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::advice;
 use super::args::{choice, number, positive};
+use super::events::Events;
 use super::progress::{READING, while_showing};
 use ppm_vk::internals::loader::MEMORY_LIMIT;
 use ppm_vk::{Environment, LightUnits, LoadOptions, Scene};
@@ -140,11 +141,16 @@ impl SceneArguments {
 
 /// Prints the notes and warnings of a scene.
 pub fn say_remarks(scene: &Scene) {
+    tell_remarks(scene, &Events::new(Vec::new()));
+}
+
+/// Tells of them.
+pub fn tell_remarks(scene: &Scene, events: &Events) {
     for note in &scene.notes {
-        say!("note: {}", advice::of_remark(note));
+        events.note(advice::of_remark(note));
     }
     for warning in &scene.warnings {
-        say!("warning: {}", advice::of_remark(warning));
+        events.warning(advice::of_remark(warning));
     }
 }
 

@@ -56,6 +56,19 @@ impl Device {
         self.finish(ticket).map(|done| done.run)
     }
 
+    /// Compiles the kernels of a recording, which otherwise happens when it is first submitted.
+    ///
+    /// # Errors
+    /// A failed Vulkan call.
+    pub fn compile(&mut self, recording: &Recording) -> Result<()> {
+        for command in recording.commands() {
+            if let Command::Dispatch(stage) = command {
+                self.pipelines.get(&self.context, stage)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Submits a recording, to run after all earlier submissions.
     ///
     /// # Errors

@@ -15,7 +15,7 @@ pub use memory::scene_buffers;
 use memory::{bindable_bytes, limits};
 pub use stages::Stages;
 
-use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
+use crate::backend::{Backend, Counters, DeviceDescription, Phase, Resolved, settings};
 use crate::config::{Accel, RenderConfig, Totals};
 use crate::emission::Aim;
 use crate::error::{Error, Result, Setting};
@@ -68,8 +68,25 @@ impl Renderer {
     /// # Errors
     /// A setting outside its range, a device without enough memory, or a failed Vulkan call.
     pub fn new(device: Device, scene: &PackedScene, camera: &Camera, config: RenderConfig) -> Result<Self> {
+        Self::watched(device, scene, camera, config, &|_| ())
+    }
+
+    /// As [`Renderer::new`]; `begins` is called at the beginning of each phase.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn watched(
+        device: Device,
+        scene: &PackedScene,
+        camera: &Camera,
+        config: RenderConfig,
+        begins: &dyn Fn(Phase),
+    ) -> Result<Self> {
         let bindable = bindable_bytes(device.summary());
-        Self::within(bindable, device, scene, camera, config)
+        let mut renderer = Self::upload(bindable, device, scene, camera, config)?;
+        begins(Phase::Pilot);
+        renderer.prepare(scene)?;
+        Ok(renderer)
     }
 
     /// As [`Renderer::new`], with photon buffers of at most `buffer_bytes` each: an iteration that needs more is split into
@@ -78,6 +95,19 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::new`].
     pub fn within(
+        buffer_bytes: u64,
+        device: Device,
+        scene: &PackedScene,
+        camera: &Camera,
+        config: RenderConfig,
+    ) -> Result<Self> {
+        let mut renderer = Self::upload(buffer_bytes, device, scene, camera, config)?;
+        renderer.prepare(scene)?;
+        Ok(renderer)
+    }
+
+    /// Uploads the scene, makes the buffers and compiles the kernels.
+    fn upload(
         buffer_bytes: u64,
         mut device: Device,
         scene: &PackedScene,
@@ -155,7 +185,8 @@ impl Renderer {
         let (iteration, picture) = (stages.shortest_iteration(), stages.picture(Totals::default()));
         renderer.make_buffers(&iteration)?;
         renderer.make_buffers(&picture)?;
-        renderer.prepare(scene)?;
+        renderer.device.compile(&iteration)?;
+        renderer.device.compile(&picture)?;
         Ok(renderer)
     }
 

@@ -12,14 +12,14 @@ mod work;
 pub use merge::Merge;
 pub use prepared::PreparedScene;
 pub use rendered::{Failure, Rendered};
-pub use snapshot::{Snapshot, Snapshots};
+pub use snapshot::{Snapshot, Snapshots, Wanted};
 pub use state::State;
 pub use until::{Progress, Until};
 pub use warning::Warning;
 
 use std::time::{Duration, Instant};
 
-use crate::backend::{Backend, DeviceDescription};
+use crate::backend::{Backend, DeviceDescription, Phase};
 use crate::config::{MAX_SIDE, RenderConfig};
 use crate::error::Result;
 use crate::estimate::{ErrorEstimate, RelativeError, of_one_photon};
@@ -112,6 +112,20 @@ impl Session {
     /// # Errors
     /// A setting outside its range, no usable device, or one without enough memory.
     pub fn new(scene: &PreparedScene, camera: &Camera, config: &RenderConfig, platform: &Platform) -> Result<Self> {
+        Self::watched(scene, camera, config, platform, &|_| ())
+    }
+
+    /// As [`Session::new`]; `begins` is called at the beginning of each [`Phase`].
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn watched(
+        scene: &PreparedScene,
+        camera: &Camera,
+        config: &RenderConfig,
+        platform: &Platform,
+        begins: &dyn Fn(Phase),
+    ) -> Result<Self> {
         let packed = scene.packed();
         let is_cpu = *platform == Platform::Cpu;
         let config = RenderConfig {
@@ -122,15 +136,20 @@ impl Session {
         };
         let renderer = match platform {
             Platform::Vulkan(device) => {
+                begins(Phase::Compile);
                 let device = Device::open(device.as_deref())?;
-                Renderer::Device(Box::new(pipeline::Renderer::new(
+                Renderer::Device(Box::new(pipeline::Renderer::watched(
                     device,
                     packed,
                     camera,
                     config.clone(),
+                    begins,
                 )?))
             }
-            Platform::Cpu => Renderer::Cpu(Box::new(cpu::Renderer::new(packed, camera, config.clone())?)),
+            Platform::Cpu => {
+                begins(Phase::Pilot);
+                Renderer::Cpu(Box::new(cpu::Renderer::new(packed, camera, config.clone())?))
+            }
         };
         let backend = renderer.backend();
         let mut warnings = Warning::before(&packed.features, &config, backend.photon_maps());
@@ -245,6 +264,11 @@ impl Session {
     /// Iterations so far.
     pub fn iterations(&self) -> u32 {
         self.renderer.backend().iterations()
+    }
+
+    /// Photon paths emitted so far.
+    pub fn photons_emitted(&self) -> u64 {
+        self.renderer.backend().emitted()
     }
 
     /// The device that it runs on.

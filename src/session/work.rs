@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::rendered::About;
-use super::{Failure, Hooks, Progress, Rendered, Snapshot, State, Until};
+use super::{Failure, Hooks, Progress, Rendered, Snapshot, State, Until, Wanted};
 use crate::backend::{Backend, Counters, Resolved};
 use crate::error::{Error, Result};
 use crate::estimate::ErrorEstimate;
-use crate::report::Profile;
+use crate::report::{Profile, StageTimes};
 
 /// A picture is kept for the case that a later iteration loses the device. This is the share of time that making it may take.
 const KEEPING: f64 = 0.01;
@@ -102,7 +102,7 @@ impl Work<'_> {
         let done = |backend: &dyn Backend, error| self.until.done(backend.iterations(), start.elapsed(), error);
         let stop = || stopped() || self.until.time.is_some_and(|time| start.elapsed() >= time);
         let mut profile = Profile::default();
-        let mut taken = start;
+        let mut stages = StageTimes::default();
         let mut kept: Option<Kept> = None;
         let mut error = None;
         let mut failure = None;
@@ -113,12 +113,8 @@ impl Work<'_> {
             let next = backend.iterations() + 1;
             let is_due = ErrorEstimate::is_due(next);
             let is_last = self.until.iterations.is_some_and(|most| next >= most);
-            let is_snapshot = self
-                .hooks
-                .snapshots
-                .as_ref()
-                .is_some_and(|s| taken.elapsed() >= s.every);
-            let another = !(is_due || is_last || is_snapshot || stop() || kept.as_ref().is_none_or(Kept::is_old));
+            let wanted = self.hooks.snapshots.as_ref().and_then(|snapshots| (snapshots.wanted)());
+            let another = !(is_due || is_last || wanted.is_some() || stop() || kept.as_ref().is_none_or(Kept::is_old));
             has_begun = another;
             let run = if another {
                 backend.iterate_before_another(&stop)
@@ -127,16 +123,27 @@ impl Work<'_> {
             };
             let run = run.and_then(|run| {
                 let iterations = backend.iterations();
-                let is_made = is_due || is_snapshot || kept.as_ref().is_none_or(Kept::is_old);
+                let is_made = is_due || wanted.is_some() || kept.as_ref().is_none_or(Kept::is_old);
+                if let Some(run) = &run
+                    && self.hooks.snapshots.is_some()
+                {
+                    stages.add(run);
+                }
                 if run.is_some() && !another && is_made {
+                    let begin = Instant::now();
                     let made = Kept::make(backend, start)?;
                     if is_due {
                         let estimate = self.about.estimate;
                         error = estimate.relative(iterations, &made.picture).map(|error| error.total);
                     }
-                    if is_snapshot {
-                        self.take_snapshot(backend, &made, start.elapsed())?;
-                        taken = Instant::now();
+                    if let Some(wanted) = wanted {
+                        let state = self.state_if(wanted, backend, &made, start.elapsed())?;
+                        self.give(Snapshot {
+                            rendered: Rendered::new(self.about, made.done(start.elapsed())).into(),
+                            state,
+                            stages: stages.clone(),
+                            cost: begin.elapsed(),
+                        });
                     }
                     kept = Some(made);
                 }
@@ -182,22 +189,25 @@ impl Work<'_> {
         })
     }
 
-    /// Gives the caller the picture so far, made after this time, and the state.
-    fn take_snapshot(&self, backend: &mut dyn Backend, made: &Kept, time: Duration) -> Result<()> {
-        let Some(snapshots) = &self.hooks.snapshots else {
-            return Ok(());
-        };
-        let state = if snapshots.with_state {
-            let spent = self.about.spent + time;
-            Some(State::of(self.about, backend, Some(&made.picture), spent)?)
-        } else {
-            None
-        };
-        (snapshots.take)(Snapshot {
-            rendered: Rendered::new(self.about, made.done(time)),
-            state,
-        });
-        Ok(())
+    /// The state of a snapshot that is made after this time.
+    fn state_if(
+        &self,
+        wanted: Wanted,
+        backend: &mut dyn Backend,
+        made: &Kept,
+        time: Duration,
+    ) -> Result<Option<Arc<State>>> {
+        if wanted < Wanted::State {
+            return Ok(None);
+        }
+        let state = State::of(self.about, backend, Some(&made.picture), self.about.spent + time)?;
+        Ok(Some(state.into()))
+    }
+
+    fn give(&self, snapshot: Snapshot) {
+        if let Some(snapshots) = &self.hooks.snapshots {
+            (snapshots.take)(snapshot);
+        }
     }
 }
 
@@ -359,8 +369,7 @@ mod tests {
         let taken = RefCell::new(Vec::new());
         let hooks = Hooks {
             snapshots: Some(Snapshots {
-                every: Duration::ZERO,
-                with_state: true,
+                wanted: &|| Some(Wanted::State),
                 take: &|snapshot| {
                     let iterations = snapshot.state.expect("a state").blocks.get::<u32>("iterations");
                     taken

@@ -1,0 +1,65 @@
+//! All who follow a render: the bar or a script, files that are rewritten.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::Result;
+
+use super::args::RenderArguments;
+use super::events::{Event, Events, JsonLines, Listener, ProgressFormat};
+use super::progress::Bar;
+use super::save::Saver;
+use super::takers::Takers;
+use super::{Outcome, advice};
+
+/// The followers of a render.
+pub struct Watch<'a> {
+    arguments: &'a RenderArguments,
+    output: PathBuf,
+    /// Tells them what happens.
+    pub events: Arc<Events>,
+}
+
+impl<'a> Watch<'a> {
+    /// Those that the arguments ask for, of a render to this file.
+    pub fn new(arguments: &'a RenderArguments, output: &Path) -> Self {
+        let follower: Box<dyn Listener> = if arguments.has_events_on_stdout() {
+            Box::new(JsonLines::default())
+        } else {
+            Box::new(Bar::new(arguments.quiet))
+        };
+        Self {
+            arguments,
+            output: output.to_owned(),
+            events: Arc::new(Events::new(vec![follower])),
+        }
+    }
+
+    /// Those who take pictures.
+    pub fn takers(&self) -> Takers {
+        let mut takers = Takers::default();
+        if let Some(saver) = Saver::new(self.arguments, &self.output, &self.events) {
+            takers.add(saver);
+        }
+        takers
+    }
+
+    /// Tells them how it ended.
+    pub fn end(&self, outcome: &Result<Outcome>) {
+        self.events.tell(&match outcome {
+            Ok(outcome) => Event::Done {
+                interrupted: *outcome == Outcome::Interrupted,
+            },
+            Err(error) => Event::Error {
+                text: advice::line(error),
+            },
+        });
+    }
+}
+
+impl RenderArguments {
+    /// Whether stdout has events and nothing else.
+    pub fn has_events_on_stdout(&self) -> bool {
+        self.progress == Some(ProgressFormat::Json)
+    }
+}
