@@ -1,7 +1,9 @@
-//! Renders seen while they go on: events for scripts.
+//! Renders seen while they go on: events for scripts, a viewer.
 
 #[path = "watching/events.rs"]
 mod events;
+#[path = "watching/viewer.rs"]
+mod viewer;
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -29,4 +31,24 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
 
 fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The pixels of the picture that the program wrote.
+fn written(folder: &Path) -> ppm_vk::Image {
+    ppm_vk::read_exr(&folder.join("o.exr")).expect("a picture")
+}
+
+#[test]
+fn wrong_arguments_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for arguments in [
+        ["--view", "localhost"],
+        ["--view", "localhost:0x1"],
+        ["--progress", "xml"],
+    ] {
+        let output = run(folder.path(), &arguments);
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
+        assert!(text.contains(arguments[0]), "{arguments:?}: {text}");
+    }
 }

@@ -14,6 +14,7 @@ use super::manual::Manual;
 use super::merge::MergeArguments;
 use super::outputs::named;
 use super::scene::SceneArguments;
+use super::view::{self, Address};
 use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
 use ppm_vk::{
@@ -230,6 +231,15 @@ pub struct RenderArguments {
     /// stderr, and nothing with --profile-json.
     #[arg(long, value_enum, value_name = "FORMAT")]
     pub progress: Option<ProgressFormat>,
+    /// Show the picture so far in tev, an image viewer, at this address [without one: 127.0.0.1:14158].
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        num_args = 0..=1,
+        default_missing_value = view::DEFAULT_ADDRESS,
+        value_parser = Address::parse
+    )]
+    pub view: Option<Address>,
     /// No progress bar.
     #[arg(long)]
     pub quiet: bool,

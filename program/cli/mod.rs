@@ -26,6 +26,7 @@ mod render;
 mod save;
 mod scene;
 mod takers;
+mod view;
 mod watch;
 
 use std::io::Write as _;

@@ -55,6 +55,8 @@ impl Takers {
 #[derive(Debug)]
 pub struct Pace {
     every: Duration,
+    /// Maximum share of the render's time for its snapshots.
+    share: f64,
     next: Cell<Instant>,
 }
 
@@ -66,7 +68,17 @@ impl Pace {
         let never = Duration::from_secs(1 << 30);
         Self {
             every,
+            share: 1.0,
             next: Cell::new(next.unwrap_or_else(|| Instant::now() + never)),
+        }
+    }
+
+    /// Due at once, then once a second at most, less often where snapshots cost more than 2 % of the time.
+    pub fn of_a_view() -> Self {
+        Self {
+            every: Duration::from_secs(1),
+            share: 0.02,
+            next: Cell::new(Instant::now()),
         }
     }
 
@@ -77,7 +89,7 @@ impl Pace {
 
     /// A snapshot that cost this time was taken.
     pub fn taken(&self, cost: Duration) {
-        let wait = self.every.max(cost);
+        let wait = self.every.max(cost.div_f64(self.share));
         self.next
             .set(Instant::now().checked_add(wait).unwrap_or(self.next.get()));
     }
@@ -156,5 +168,17 @@ mod tests {
         mailbox.put(2);
         mailbox.close();
         assert_eq!((mailbox.next(), mailbox.next()), (Some(2), None));
+    }
+
+    #[test]
+    fn views_that_cost_more_are_taken_less_often() {
+        let wait = |cost| {
+            let pace = Pace::of_a_view();
+            assert!(pace.is_due(), "the first picture is taken at once");
+            pace.taken(Duration::from_millis(cost));
+            (pace.next.get() - Instant::now()).as_secs_f64()
+        };
+        // 5 ms: once a second; 200 ms: every 10 s.
+        assert!((0.9..=1.0).contains(&wait(5)) && (9.9..=10.0).contains(&wait(200)));
     }
 }

@@ -1,4 +1,4 @@
-//! All who follow a render: the bar or a script, files that are rewritten.
+//! All who follow a render: the bar or a script, files that are rewritten, a viewer.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,6 +10,7 @@ use super::events::{Event, Events, JsonLines, Listener, ProgressFormat};
 use super::progress::Bar;
 use super::save::Saver;
 use super::takers::Takers;
+use super::view::Viewer;
 use super::{Outcome, advice};
 
 /// The followers of a render.
@@ -41,6 +42,9 @@ impl<'a> Watch<'a> {
         if let Some(saver) = Saver::new(self.arguments, &self.output, &self.events) {
             takers.add(saver);
         }
+        if let Some(address) = &self.arguments.view {
+            takers.add(Viewer::new(address.clone(), name_of(&self.output), &self.events));
+        }
         takers
     }
 
@@ -62,4 +66,10 @@ impl RenderArguments {
     pub fn has_events_on_stdout(&self) -> bool {
         self.progress == Some(ProgressFormat::Json)
     }
+}
+
+/// The name by which viewers show a picture.
+fn name_of(output: &Path) -> String {
+    let name = output.file_name().unwrap_or(output.as_os_str());
+    name.to_string_lossy().into_owned()
 }
