@@ -156,12 +156,13 @@ fn functions_that_kernels_call_in_loops_return_once() {
 }
 
 /// What only the program needs.
-const OF_THE_PROGRAM: [&str; 8] = [
+const OF_THE_PROGRAM: [&str; 9] = [
     "anyhow",
     "clap",
     "clap_complete",
     "clap_mangen",
     "ctrlc",
+    "httparse",
     "indicatif",
     "plotters",
     "signal-hook",

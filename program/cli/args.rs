@@ -14,6 +14,7 @@ use super::manual::Manual;
 use super::merge::MergeArguments;
 use super::outputs::named;
 use super::scene::SceneArguments;
+use super::serve;
 use super::view::{self, Address};
 use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
@@ -240,6 +241,10 @@ pub struct RenderArguments {
         value_parser = Address::parse
     )]
     pub view: Option<Address>,
+    /// Show the picture so far, its error and the times of stages on a page for browsers on this computer; with HOST, at that
+    /// address, for all who reach it. There is no password.
+    #[arg(long, value_name = "[HOST:]PORT", value_parser = serve::address)]
+    pub serve: Option<Address>,
     /// No progress bar.
     #[arg(long)]
     pub quiet: bool,

@@ -1,4 +1,4 @@
-//! What happens in a render, told to all who follow it: the progress bar, a script (`--progress json`).
+//! What happens in a render, told to all who follow it: the progress bar, a script (`--progress json`), a browser (`--serve`).
 
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;

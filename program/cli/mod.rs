@@ -25,6 +25,7 @@ mod progress;
 mod render;
 mod save;
 mod scene;
+mod serve;
 mod takers;
 mod view;
 mod watch;

@@ -41,7 +41,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         gather,
         watch: &watch,
     };
-    let outcome = job.run();
+    let outcome = watch.begin().and_then(|()| job.run());
     watch.end(&outcome);
     outcome
 }

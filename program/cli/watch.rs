@@ -1,4 +1,4 @@
-//! All who follow a render: the bar or a script, files that are rewritten, a viewer.
+//! All who follow a render: the bar or a script, files that are rewritten, a viewer, a page.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,6 +9,7 @@ use super::args::RenderArguments;
 use super::events::{Event, Events, JsonLines, Listener, ProgressFormat};
 use super::progress::Bar;
 use super::save::Saver;
+use super::serve::{self, Board, Page};
 use super::takers::Takers;
 use super::view::Viewer;
 use super::{Outcome, advice};
@@ -19,20 +20,38 @@ pub struct Watch<'a> {
     output: PathBuf,
     /// Tells them what happens.
     pub events: Arc<Events>,
+    board: Option<Arc<Board>>,
 }
 
 impl<'a> Watch<'a> {
     /// Those that the arguments ask for, of a render to this file.
     pub fn new(arguments: &'a RenderArguments, output: &Path) -> Self {
+        let board = arguments.serve.as_ref().map(|_| Arc::new(Board::new(name_of(output))));
         let follower: Box<dyn Listener> = if arguments.has_events_on_stdout() {
             Box::new(JsonLines::default())
         } else {
             Box::new(Bar::new(arguments.quiet))
         };
+        let mut listeners = vec![follower];
+        if let Some(board) = &board {
+            listeners.push(Box::new(board.clone()));
+        }
         Self {
             arguments,
             output: output.to_owned(),
-            events: Arc::new(Events::new(vec![follower])),
+            events: Arc::new(Events::new(listeners)),
+            board,
+        }
+    }
+
+    /// Opens the page.
+    ///
+    /// # Errors
+    /// A port that can't be listened on.
+    pub fn begin(&self) -> Result<()> {
+        match (&self.arguments.serve, &self.board) {
+            (Some(address), Some(board)) => serve::start(address, board, &self.events),
+            _ => Ok(()),
         }
     }
 
@@ -44,6 +63,9 @@ impl<'a> Watch<'a> {
         }
         if let Some(address) = &self.arguments.view {
             takers.add(Viewer::new(address.clone(), name_of(&self.output), &self.events));
+        }
+        if let Some(board) = &self.board {
+            takers.add(Page::new(board.clone()));
         }
         takers
     }
@@ -58,6 +80,9 @@ impl<'a> Watch<'a> {
                 text: advice::line(error),
             },
         });
+        if let Some(board) = &self.board {
+            board.wait_for_browsers();
+        }
     }
 }
 
