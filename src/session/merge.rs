@@ -247,7 +247,6 @@ impl Merge {
         };
         let iterations = SequenceIterations(of_sequences);
         let estimate = first.estimate;
-        let error = estimate.relative(iterations, &picture);
         Rendered::from(Of {
             metadata: Metadata {
                 iterations: u64::from(totals.iterations),
@@ -255,12 +254,11 @@ impl Merge {
                 seed: u64::from(first.seed),
                 device: device.name.clone(),
                 seconds: self.shares.values().map(|share| share.seconds).sum(),
-                estimated_error: error.map(|error| error.total),
+                estimated_error: None,
             },
             iterations,
             picture: picture.into(),
             estimate,
-            error,
             subject: Subject {
                 scene: first.scene.clone(),
                 resolution: first.resolution,

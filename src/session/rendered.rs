@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use super::Warning;
@@ -78,10 +78,10 @@ impl About {
 /// What a [`Rendered`] is made of.
 pub(super) struct Of {
     pub picture: Arc<Resolved>,
+    /// Without the error.
     pub metadata: Metadata,
     pub iterations: SequenceIterations,
     pub estimate: ErrorEstimate,
-    pub error: Option<RelativeError>,
     pub subject: Subject,
     pub max_depth: u32,
     pub profile: Profile,
@@ -89,17 +89,23 @@ pub(super) struct Of {
 }
 
 /// A picture with its errors, warnings and profile.
-pub struct Rendered(Of);
+pub struct Rendered {
+    of: Of,
+    /// Estimated when it is first asked for: many snapshots need it on another thread than the render's, or never.
+    error: OnceLock<Option<RelativeError>>,
+}
 
 impl From<Of> for Rendered {
     fn from(of: Of) -> Self {
-        Self(of)
+        Self {
+            of,
+            error: OnceLock::new(),
+        }
     }
 }
 
 impl Rendered {
     pub(super) fn new(about: &About, done: Done) -> Self {
-        let error = about.estimate.relative(done.iterations, &done.picture);
         let subject = Subject {
             scene: about.scene.clone(),
             resolution: about.config.resolution,
@@ -109,19 +115,18 @@ impl Rendered {
             device: about.device.clone(),
             counters: done.counters,
         };
-        Self(Of {
+        Self::from(Of {
             metadata: Metadata {
                 iterations: u64::from(done.iterations),
                 photons_emitted: done.emitted,
                 seed: u64::from(about.config.seed),
                 device: subject.device.name.clone(),
                 seconds: about.spent.as_secs_f64() + done.seconds,
-                estimated_error: error.map(|error| error.total),
+                estimated_error: None,
             },
             iterations: done.iterations.into(),
             picture: done.picture,
             estimate: about.estimate,
-            error,
             subject,
             max_depth: about.config.max_depth,
             profile: done.profile,
@@ -131,32 +136,38 @@ impl Rendered {
 
     /// The picture.
     pub fn image(&self) -> &Image {
-        &self.0.picture.image
+        &self.of.picture.image
     }
 
     /// Of each pixel, the share of its camera paths that met a surface.
     pub fn alpha(&self) -> &[f32] {
-        &self.0.picture.alpha
+        &self.of.picture.alpha
     }
 
     /// Iterations in it.
     pub fn iterations(&self) -> u32 {
-        self.0.metadata.iterations as u32
+        self.of.metadata.iterations as u32
     }
 
     /// Seconds of rendering.
     pub fn seconds(&self) -> f64 {
-        self.0.metadata.seconds
+        self.of.metadata.seconds
     }
 
     /// Its estimated error; `None` after fewer than four iterations, and if it is black.
     pub fn error(&self) -> Option<RelativeError> {
-        self.0.error
+        let Of {
+            estimate,
+            iterations,
+            picture,
+            ..
+        } = &self.of;
+        *self.error.get_or_init(|| estimate.relative(*iterations, picture))
     }
 
     /// The estimated error of each pixel, in units of radiance; `None` as in [`Rendered::error`].
     pub fn pixel_errors(&self) -> Option<Image> {
-        self.0.estimate.of_pixels(self.0.iterations, &self.0.picture)
+        self.of.estimate.of_pixels(self.of.iterations, &self.of.picture)
     }
 
     /// Warnings about the picture.
@@ -165,8 +176,8 @@ impl Rendered {
             counters,
             photons_emitted,
             ..
-        } = &self.0.subject;
-        let mut warnings = Warning::of(counters, *photons_emitted, self.0.max_depth);
+        } = &self.of.subject;
+        let mut warnings = Warning::of(counters, *photons_emitted, self.of.max_depth);
         if self.image().pixels().iter().flatten().all(|&value| value == 0.0) {
             warnings.push(Warning::Black);
         }
@@ -175,17 +186,17 @@ impl Rendered {
 
     /// The failure that ended it early.
     pub fn failure(&self) -> Option<&Failure> {
-        self.0.failure.as_ref()
+        self.of.failure.as_ref()
     }
 
     /// The subject of its profile, with counters.
     pub fn subject(&self) -> &Subject {
-        &self.0.subject
+        &self.of.subject
     }
 
     /// Every launch of the render call, if [`Hooks::profile`](super::Hooks::profile) is set.
     pub fn profile(&self) -> &Profile {
-        &self.0.profile
+        &self.of.profile
     }
 
     /// Writes an OpenEXR file: linear RGB, alpha, the error of each pixel, and render metadata as attributes.
@@ -195,10 +206,14 @@ impl Rendered {
     pub fn write_exr(&self, path: &Path) -> Result<()> {
         let errors = self.pixel_errors();
         let layers = Layers {
-            alpha: Some(&self.0.picture.alpha),
+            alpha: Some(&self.of.picture.alpha),
             errors: errors.as_ref(),
         };
-        film::write_exr(self.image(), layers, path, &self.0.metadata)
+        let metadata = Metadata {
+            estimated_error: self.error().map(|error| error.total),
+            ..self.of.metadata.clone()
+        };
+        film::write_exr(self.image(), layers, path, &metadata)
     }
 
     /// Writes a tone-mapped PNG.

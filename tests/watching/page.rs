@@ -85,6 +85,13 @@ pub fn status_when(port: u16, what: &str, is_wanted: impl Fn(&Value) -> bool) ->
     }
 }
 
+/// Asks until there is a picture whose error is known.
+pub fn status_with_error(port: u16) -> Value {
+    status_when(port, "an error is known", |status| {
+        status["picture"]["iteration"].as_u64() >= Some(4) && !status["progress"]["estimated_error"].is_null()
+    })
+}
+
 /// The values of half floats.
 fn halves(bytes: &[u8]) -> Vec<f32> {
     let value = |pair: &[u8]| half::f16::from_le_bytes([pair[0], pair[1]]).to_f32();
@@ -110,9 +117,7 @@ fn a_page_shows_the_render_as_it_goes_on() {
     for outside in ["http:", "https:", "src=", "@import", "url("] {
         assert!(!page.text().contains(outside), "the page has «{outside}»");
     }
-    let status = status_when(port, "an error is known", |status| {
-        !status["picture"]["estimated_error"].is_null()
-    });
+    let status = status_with_error(port);
     assert_eq!(status["title"], "o.exr");
     assert_eq!(status["picture"]["resolution"], serde_json::json!([32, 24]));
     assert!(

@@ -111,7 +111,6 @@ impl Board {
                 "resolution": subject.resolution,
                 "iteration": rendered.iterations(),
                 "device": subject.device.name,
-                "estimated_error": rendered.error().map(|error| error.total),
             })
         });
         let status = json!({
