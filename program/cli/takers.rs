@@ -51,47 +51,62 @@ impl Takers {
     }
 }
 
-/// When a taker is due.
+/// When a taker wants a picture.
 #[derive(Debug)]
 pub struct Pace {
     every: Duration,
     /// Maximum share of the render's time for its snapshots.
     share: f64,
+    /// When it wants one that the render makes anyway.
+    spare: Cell<Instant>,
+    /// When it wants one that costs time.
     next: Cell<Instant>,
 }
 
+/// This time from now; never, if that is beyond what can be counted.
+fn after(wait: Duration) -> Instant {
+    const NEVER: Duration = Duration::from_secs(1 << 30);
+    Instant::now() + wait.min(NEVER)
+}
+
 impl Pace {
-    /// Due whenever this time has passed.
+    /// Whenever this time has passed.
     pub fn every(every: Duration) -> Self {
-        // A time beyond what can be counted is never.
-        let next = Instant::now().checked_add(every);
-        let never = Duration::from_secs(1 << 30);
         Self {
             every,
             share: 1.0,
-            next: Cell::new(next.unwrap_or_else(|| Instant::now() + never)),
+            spare: Cell::new(after(every)),
+            next: Cell::new(after(every)),
         }
     }
 
-    /// Due at once, then once a second at most, less often where snapshots cost more than 2 % of the time.
+    /// At once, then once a second at most, less often where snapshots cost more than 2 % of the time.
     pub fn of_a_view() -> Self {
         Self {
             every: Duration::from_secs(1),
             share: 0.02,
+            spare: Cell::new(Instant::now()),
             next: Cell::new(Instant::now()),
         }
     }
 
-    /// Whether it is due.
+    /// Whether it wants a picture, even if that costs time.
     pub fn is_due(&self) -> bool {
         Instant::now() >= self.next.get()
     }
 
+    /// The picture that it wants, if any.
+    pub fn wants(&self) -> Option<Wanted> {
+        let is_welcome = Instant::now() >= self.spare.get();
+        let spare = is_welcome.then_some(Wanted::Spare);
+        if self.is_due() { Some(Wanted::Picture) } else { spare }
+    }
+
     /// A snapshot that cost this time was taken.
     pub fn taken(&self, cost: Duration) {
-        let wait = self.every.max(cost.div_f64(self.share));
-        self.next
-            .set(Instant::now().checked_add(wait).unwrap_or(self.next.get()));
+        self.spare.set(after(self.every));
+        let next = after(self.every.max(cost.div_f64(self.share)));
+        self.next.set(self.next.get().max(next));
     }
 }
 
@@ -172,13 +187,20 @@ mod tests {
 
     #[test]
     fn views_that_cost_more_are_taken_less_often() {
-        let wait = |cost| {
-            let pace = Pace::of_a_view();
-            assert!(pace.is_due(), "the first picture is taken at once");
+        let pace = Pace::of_a_view();
+        assert_eq!(
+            pace.wants(),
+            Some(Wanted::Picture),
+            "the first picture is taken at once"
+        );
+        let waits = |cost| {
             pace.taken(Duration::from_millis(cost));
-            (pace.next.get() - Instant::now()).as_secs_f64()
+            [&pace.spare, &pace.next].map(|time| (time.get() - Instant::now()).as_secs_f64().ceil())
         };
-        // 5 ms: once a second; 200 ms: every 10 s.
-        assert!((0.9..=1.0).contains(&wait(5)) && (9.9..=10.0).contains(&wait(200)));
+        assert_eq!(waits(5), [1.0, 1.0], "cheap ones once a second");
+        assert_eq!(waits(200), [1.0, 10.0], "others for 2 % of the time");
+        assert_eq!(waits(0), [1.0, 10.0], "one that cost nothing changes nothing in that");
+        pace.spare.set(Instant::now());
+        assert_eq!(pace.wants(), Some(Wanted::Spare));
     }
 }

@@ -87,7 +87,7 @@ impl Viewer {
 
 impl Taker for Viewer {
     fn wants(&self) -> Option<Wanted> {
-        (self.pace.is_due() && self.pictures.is_awaited()).then_some(Wanted::Picture)
+        self.pace.wants().filter(|_| self.pictures.is_awaited())
     }
 
     fn take(&self, snapshot: &Snapshot) {

@@ -22,6 +22,8 @@ pub struct Snapshot {
 /// The snapshot that is wanted of an iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Wanted {
+    /// A picture, if the render makes one anyway, for its error or to keep it.
+    Spare,
     /// A picture.
     Picture,
     /// A picture and the state.
@@ -30,7 +32,8 @@ pub enum Wanted {
 
 /// Snapshots of a render that goes on.
 pub struct Snapshots<'a> {
-    /// Called before every iteration: the snapshot that is wanted after it, if any. Each costs time of the render.
+    /// Called before every iteration: the snapshot that is wanted after it, if any. Each costs time of the render, unless it is
+    /// [`Wanted::Spare`].
     pub wanted: &'a dyn Fn() -> Option<Wanted>,
     /// Takes a snapshot, between two iterations; the render waits for it to return.
     pub take: &'a dyn Fn(Snapshot),

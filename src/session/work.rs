@@ -114,7 +114,8 @@ impl Work<'_> {
             let is_due = ErrorEstimate::is_due(next);
             let is_last = self.until.iterations.is_some_and(|most| next >= most);
             let wanted = self.hooks.snapshots.as_ref().and_then(|snapshots| (snapshots.wanted)());
-            let another = !(is_due || is_last || wanted.is_some() || stop() || kept.as_ref().is_none_or(Kept::is_old));
+            let is_wanted = wanted >= Some(Wanted::Picture);
+            let another = !(is_due || is_last || is_wanted || stop() || kept.as_ref().is_none_or(Kept::is_old));
             has_begun = another;
             let run = if another {
                 backend.iterate_before_another(&stop)
@@ -123,26 +124,27 @@ impl Work<'_> {
             };
             let run = run.and_then(|run| {
                 let iterations = backend.iterations();
-                let is_made = is_due || wanted.is_some() || kept.as_ref().is_none_or(Kept::is_old);
+                let is_needed = is_due || kept.as_ref().is_none_or(Kept::is_old);
                 if let Some(run) = &run
                     && self.hooks.snapshots.is_some()
                 {
                     stages.add(run);
                 }
-                if run.is_some() && !another && is_made {
-                    let begin = Instant::now();
+                if run.is_some() && !another && (is_needed || is_wanted) {
                     let made = Kept::make(backend, start)?;
+                    let cost = if is_needed { Duration::ZERO } else { made.cost };
                     if is_due {
                         let estimate = self.about.estimate;
                         error = estimate.relative(iterations, &made.picture).map(|error| error.total);
                     }
                     if let Some(wanted) = wanted {
+                        let begin = Instant::now();
                         let state = self.state_if(wanted, backend, &made, start.elapsed())?;
                         self.give(Snapshot {
                             rendered: Rendered::new(self.about, made.done(start.elapsed())).into(),
                             state,
                             stages: stages.clone(),
-                            cost: begin.elapsed(),
+                            cost: cost + begin.elapsed(),
                         });
                     }
                     kept = Some(made);
@@ -230,6 +232,8 @@ mod tests {
         is_lost: bool,
         /// Whether its memory can still be read.
         is_readable: bool,
+        /// Time that a picture takes.
+        resolving: Duration,
     }
 
     fn lost_in(iteration: u32, is_readable: bool) -> Lost {
@@ -238,6 +242,7 @@ mod tests {
             lost_in: iteration,
             is_lost: false,
             is_readable,
+            resolving: Duration::ZERO,
         }
     }
 
@@ -258,6 +263,7 @@ mod tests {
             if self.is_lost && !self.is_readable {
                 return Err(Error::Device("the device is lost".to_owned()));
             }
+            std::thread::sleep(self.resolving);
             let pixel = [self.iterations as f32; 4];
             Ok(Resolved::from_film(
                 [1, 1],
@@ -386,6 +392,33 @@ mod tests {
         };
         work.run(&mut lost_in(u32::MAX, true)).expect("a picture");
         assert_eq!(taken.into_inner(), [(1, 1), (2, 2), (3, 3)]);
+    }
+
+    #[test]
+    fn spare_snapshots_are_those_of_pictures_that_are_made_anyway() {
+        let taken = RefCell::new(Vec::new());
+        let hooks = Hooks {
+            snapshots: Some(Snapshots {
+                wanted: &|| Some(Wanted::Spare),
+                take: &|snapshot| {
+                    assert!(snapshot.state.is_none() && snapshot.cost < Duration::from_millis(50));
+                    taken.borrow_mut().push(snapshot.rendered.iterations());
+                },
+            }),
+            ..Hooks::default()
+        };
+        let work = Work {
+            until: Until::iterations(10),
+            about: &About::of_nothing(),
+            hooks: &hooks,
+        };
+        // Pictures so slow that the first one is kept until an error is due.
+        let mut device = Lost {
+            resolving: Duration::from_millis(50),
+            ..lost_in(u32::MAX, true)
+        };
+        work.run(&mut device).expect("a picture");
+        assert_eq!(taken.into_inner(), [1, 4, 8]);
     }
 
     #[test]

@@ -128,7 +128,7 @@ impl Page {
 
 impl Taker for Page {
     fn wants(&self) -> Option<Wanted> {
-        (self.pace.is_due() && self.board.is_watched()).then_some(Wanted::Picture)
+        self.pace.wants().filter(|_| self.board.is_watched())
     }
 
     fn take(&self, snapshot: &Snapshot) {
