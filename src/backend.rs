@@ -69,8 +69,12 @@ pub trait Backend {
     /// # Errors
     /// Blocks of another kind of renderer or picture; whatever the device can't do.
     fn restore(&mut self, learned: &Blocks) -> Result<()>;
+    /// Its figures so far.
+    fn figures(&self) -> &Figures;
     /// Totals of all iterations.
-    fn totals(&self) -> Totals;
+    fn totals(&self) -> Totals {
+        self.figures().totals
+    }
     /// Iterations done.
     fn iterations(&self) -> u32 {
         self.totals().iterations
@@ -80,12 +84,18 @@ pub trait Backend {
         self.totals().emitted
     }
     /// Counters of the render.
-    fn counters(&self) -> Counters;
+    fn counters(&self) -> Counters {
+        self.figures().counters
+    }
     /// The median of the initial radii of global photons, render units.
-    fn radius(&self) -> f32;
+    fn radius(&self) -> f32 {
+        self.figures().radius
+    }
     /// Mean flux of the photons that visible points accepted before the first iteration, not divided by the emitted paths; `None`
     /// if there were none.
-    fn photon_flux(&self) -> Option<f64>;
+    fn photon_flux(&self) -> Option<f64> {
+        self.figures().photon_flux
+    }
     /// Whether photon paths are aimed.
     fn aims(&self) -> bool;
     /// Number of photon maps: 2 if caustic photons have one of their own.
@@ -137,6 +147,19 @@ pub struct DeviceDescription {
     pub driver: String,
     /// Nanoseconds of a timestamp tick.
     pub timestamp_period_ns: f32,
+}
+
+/// Figures of a render so far, the same on a device and on the CPU.
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
+pub struct Figures {
+    /// See [`Backend::totals`].
+    pub totals: Totals,
+    /// See [`Backend::counters`].
+    pub counters: Counters,
+    /// See [`Backend::radius`].
+    pub radius: f32,
+    /// See [`Backend::photon_flux`].
+    pub photon_flux: Option<f64>,
 }
 
 /// Counters of a render.

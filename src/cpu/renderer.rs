@@ -18,7 +18,7 @@ use super::photons::{Ending, trace_photon_path};
 use super::slots::{Discs, Pixel, Slot};
 use super::statistics::Statistics;
 use super::vector::mean;
-use crate::backend::{Backend, Counters, DeviceDescription, Resolved, settings};
+use crate::backend::{Backend, DeviceDescription, Figures, Resolved, settings};
 use crate::config::{Direct, Estimator, RenderConfig, SEQUENCES, Totals, iterations_of};
 use crate::error::{Error, Result, Setting};
 use crate::gather::{METHODS, Runs, default_cpu_method};
@@ -45,11 +45,7 @@ pub struct Renderer {
     pixels: Vec<Pixel>,
     /// The slots of a pixel are contiguous.
     slots: Vec<Slot>,
-    /// Median of the initial radii.
-    radius: f32,
-    photon_flux: Option<f64>,
-    totals: Totals,
-    counters: Counters,
+    figures: Figures,
     created: Instant,
 }
 
@@ -79,10 +75,7 @@ impl Renderer {
             paths: Vec::new(),
             pixels: vec![Pixel::default(); pixels],
             slots: vec![Slot::default(); pixels * pixel_slots],
-            radius: 0.0,
-            photon_flux: None,
-            totals: Totals::default(),
-            counters: Counters::default(),
+            figures: Figures::default(),
             created: Instant::now(),
         };
         renderer.choose_radii()?;
@@ -178,7 +171,7 @@ impl Renderer {
             .zip(&self.paths)
             .enumerate()
             .for_each(of_pixel);
-        self.counters.truncated_paths += self.paths.iter().map(|path| path.truncated).sum::<u64>();
+        self.figures.counters.truncated_paths += self.paths.iter().map(|path| path.truncated).sum::<u64>();
     }
 
     /// Samples the coverage of discs; for pixels without photons, whether a surface surrounds the point.
@@ -251,7 +244,7 @@ impl Renderer {
 
 impl Backend for Renderer {
     fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
-        let iteration = self.totals.iterations;
+        let iteration = self.figures.totals.iterations;
         let mut clock = Clock {
             created: self.created,
             run: Run::default(),
@@ -290,11 +283,11 @@ impl Backend for Renderer {
             self.paths = clock.time("camera", || self.trace_camera_paths(turn));
             clock.time("direct", || self.add_direct(turn));
         }
-        self.counters.photons_landed += stored;
-        self.counters.photons_stored += stored;
-        self.counters.truncated_paths += ended[0];
-        self.counters.non_finite += ended[1];
-        self.totals.add(Totals {
+        self.figures.counters.photons_landed += stored;
+        self.figures.counters.photons_stored += stored;
+        self.figures.counters.truncated_paths += ended[0];
+        self.figures.counters.non_finite += ended[1];
+        self.figures.totals.add(Totals {
             iterations: 1,
             emitted: emitted.into(),
             camera_paths: turn.paths,
@@ -303,8 +296,8 @@ impl Backend for Renderer {
     }
 
     fn resolve_all(&mut self) -> Result<Resolved> {
-        self.counters.photons_accepted = self.statistics().map(|statistics| statistics.accepted).sum();
-        let totals = self.totals.at_least_one();
+        self.figures.counters.photons_accepted = self.statistics().map(|statistics| statistics.accepted).sum();
+        let totals = self.figures.totals.at_least_one();
         let mut non_finite = 0;
         // Values beyond f32 are black.
         let rounded = |value: DVec4| Some(value.as_vec4()).filter(|value| value.is_finite());
@@ -330,7 +323,7 @@ impl Backend for Renderer {
                 .map(|pixel| rounded(of_pixel(pixel)).unwrap_or_default());
             sequences.extend(pictures.map(|value| value.to_array()));
         }
-        self.counters.non_finite += non_finite;
+        self.figures.counters.non_finite += non_finite;
         Ok(Resolved::from_film(
             self.config.resolution,
             &film,
@@ -347,20 +340,8 @@ impl Backend for Renderer {
         self.continue_from(learned)
     }
 
-    fn totals(&self) -> Totals {
-        self.totals
-    }
-
-    fn counters(&self) -> Counters {
-        self.counters
-    }
-
-    fn radius(&self) -> f32 {
-        self.radius
-    }
-
-    fn photon_flux(&self) -> Option<f64> {
-        self.photon_flux
+    fn figures(&self) -> &Figures {
+        &self.figures
     }
 
     fn aims(&self) -> bool {

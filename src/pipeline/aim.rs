@@ -48,7 +48,7 @@ impl Renderer {
             return Ok(());
         }
         if iteration > 0 {
-            let recording = self.stages().film(self.totals);
+            let recording = self.stages().film(self.figures.totals);
             self.run(&recording)?;
             let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
             self.settings.demand_floor2 = demand_floor2(&Image::from_film(self.config.resolution, &film));

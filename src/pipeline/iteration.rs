@@ -95,7 +95,7 @@ impl Renderer {
                 self.photon_need = [of_lane.max(status.lane_need), of_batch.max(status.batch_need)];
                 return Ok((all, status));
             }
-            self.counters.repeated_iterations += 1;
+            self.figures.counters.repeated_iterations += 1;
             // The iteration submitted ahead has stopped as well.
             if let Some(begun) = self.ahead.take() {
                 all.add(self.device.finish(begun.ticket)?.run);
@@ -146,7 +146,7 @@ impl Renderer {
     /// Runs an iteration, unless `stop` interrupts it. With `another`, the caller runs another iteration before it requests a
     /// picture, so that one may be submitted ahead.
     pub(super) fn do_iteration(&mut self, stop: &dyn Fn() -> bool, another: bool) -> Result<Option<Run>> {
-        let iteration = self.totals.iterations;
+        let iteration = self.figures.totals.iterations;
         if self.ahead.is_none() {
             self.fit_photon_buffers()?;
             self.begin_block(iteration)?;
@@ -168,15 +168,15 @@ impl Renderer {
     /// Adds a completed iteration to the totals.
     fn count_iteration(&mut self, iteration: u32, status: &StatusCounters, values: &[u32], added: Totals) {
         let before = self.reported.replace(*status).unwrap_or_else(StatusCounters::zeroed);
-        count(&mut self.counters, &before, status);
+        count(&mut self.figures.counters, &before, status);
         self.learn(iteration, values);
-        self.totals.add(added);
+        self.figures.totals.add(added);
     }
 
     /// Completes the iteration that was submitted ahead, before anything else uses the device.
     pub(super) fn complete_ahead(&mut self) -> Result<()> {
         let Some(begun) = self.ahead.take() else { return Ok(()) };
-        let iteration = self.totals.iterations;
+        let iteration = self.figures.totals.iterations;
         let ended = self.end_of(begun, &mut Run::default())?;
         if ended.status.retry == 0 {
             self.count_iteration(iteration, &ended.status, &ended.values, ended.added);

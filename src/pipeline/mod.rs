@@ -15,7 +15,7 @@ pub use memory::scene_buffers;
 use memory::{bindable_bytes, limits};
 pub use stages::Stages;
 
-use crate::backend::{Backend, Counters, DeviceDescription, Phase, Resolved, settings};
+use crate::backend::{Backend, DeviceDescription, Figures, Phase, Resolved, settings};
 use crate::config::{Accel, RenderConfig, Totals};
 use crate::emission::Aim;
 use crate::error::{Error, Result, Setting};
@@ -39,11 +39,7 @@ pub struct Renderer {
     limits: Limits,
     settings: Settings,
     features: SceneFeatures,
-    /// Median of the initial radii.
-    radius: f32,
-    photon_flux: Option<f64>,
-    totals: Totals,
-    counters: Counters,
+    figures: Figures,
     /// Maximum number of photons of a lane, and of a batch, so far.
     photon_need: [u32; 2],
     /// Whether the photon buffers have been fitted.
@@ -166,10 +162,7 @@ impl Renderer {
                 lens: scene.features.lens || camera.lens.is_some(),
                 ..scene.features
             },
-            radius: 0.0,
-            photon_flux: None,
-            totals: Totals::default(),
-            counters: Counters::default(),
+            figures: Figures::default(),
             photon_need: [0, 0],
             fitted: false,
             aim: None,
@@ -221,10 +214,10 @@ impl Renderer {
     /// As [`Backend::resolve`].
     pub fn picture(&mut self) -> Result<(Run, Resolved)> {
         self.complete_ahead()?;
-        let recording = self.stages().picture(self.totals);
+        let recording = self.stages().picture(self.figures.totals);
         let (run, status) = self.run_reporting(recording)?;
-        self.counters.non_finite += u64::from(status.non_finite);
-        self.counters.photons_accepted = status.photons_accepted();
+        self.figures.counters.non_finite += u64::from(status.non_finite);
+        self.figures.counters.photons_accepted = status.photons_accepted();
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
         let behind_glass = self.device.download(BufferId::GlassFilm, None)?;
         let mut sequences = Vec::new();
@@ -344,20 +337,8 @@ impl Backend for Renderer {
         self.continue_from(learned)
     }
 
-    fn totals(&self) -> Totals {
-        self.totals
-    }
-
-    fn counters(&self) -> Counters {
-        self.counters
-    }
-
-    fn radius(&self) -> f32 {
-        self.radius
-    }
-
-    fn photon_flux(&self) -> Option<f64> {
-        self.photon_flux
+    fn figures(&self) -> &Figures {
+        &self.figures
     }
 
     fn aims(&self) -> bool {

@@ -42,8 +42,8 @@ impl Renderer {
         let statistics: Vec<Statistics> = self
             .device
             .download(BufferId::StatisticsOf, Some(self.sizes.slots() as usize))?;
-        self.radius = radius::median(&statistics);
-        self.counters = Counters::default();
+        self.figures.radius = radius::median(&statistics);
+        self.figures.counters = Counters::default();
         Ok(())
     }
 
@@ -55,7 +55,7 @@ impl Renderer {
         let photons: Vec<Photon> = self.device.download(BufferId::Photons, Some(count[0] as usize))?;
         // The pilot is a batch; the densities of the whole iteration's photons are higher.
         let share = self.sizes.batch_paths as f32 / self.config.photons as f32;
-        self.photon_flux = radius::mean_flux(&photons);
+        self.figures.photon_flux = radius::mean_flux(&photons);
         let first = radius::first(&visible_points, &footprints, &photons, share);
         self.settings.first_footprints = first.map(|first| first.footprints);
         self.upload_settings()?;

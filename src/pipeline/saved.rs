@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Renderer;
 use super::stages::reporting;
-use crate::backend::{Backend as _, Counters, DeviceDescription};
-use crate::config::Totals;
+use crate::backend::{Backend as _, DeviceDescription, Figures};
 use crate::emission::Aim;
 use crate::error::{Error, Remedy, Result};
 use crate::random::CameraTurn;
@@ -24,10 +23,7 @@ struct Host {
     drop_unwanted: bool,
     first_footprints: [f32; 2],
     demand_floor2: f32,
-    radius: f32,
-    photon_flux: Option<f64>,
-    totals: Totals,
-    counters: Counters,
+    figures: Figures,
     photon_need: [u32; 2],
     fitted: bool,
     aim: Option<Aim>,
@@ -48,10 +44,7 @@ impl Renderer {
             drop_unwanted: self.config.drop_unwanted,
             first_footprints: self.settings.first_footprints,
             demand_floor2: self.settings.demand_floor2,
-            radius: self.radius,
-            photon_flux: self.photon_flux,
-            totals: self.totals,
-            counters: self.counters,
+            figures: self.figures,
             photon_need: self.photon_need,
             fitted: self.fitted,
             aim: self.aim.clone(),
@@ -83,10 +76,7 @@ impl Renderer {
         self.config.drop_unwanted = host.drop_unwanted;
         self.settings.first_footprints = host.first_footprints;
         self.settings.demand_floor2 = host.demand_floor2;
-        self.radius = host.radius;
-        self.photon_flux = host.photon_flux;
-        self.totals = host.totals;
-        self.counters = host.counters;
+        self.figures = host.figures;
         self.photon_need = host.photon_need;
         self.fitted = host.fitted && host.device == self.device();
         self.upload_settings()?;
@@ -106,7 +96,7 @@ impl Renderer {
     /// Finds the visible points of the last iteration: those of the paper's estimator are found once, and pictures tell of light
     /// behind glass by them.
     fn find_last_visible_points(&mut self) -> Result<()> {
-        let Some(turn) = CameraTurn::last(&self.config, self.totals) else {
+        let Some(turn) = CameraTurn::last(&self.config, self.figures.totals) else {
             return Ok(());
         };
         self.run_until_it_fits(|stages| {

@@ -216,7 +216,7 @@ impl Work<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::DeviceDescription;
+    use crate::backend::{DeviceDescription, Figures};
     use crate::config::Totals;
     use crate::layout::BehindGlass;
     use crate::record::Run;
@@ -227,7 +227,7 @@ mod tests {
 
     /// A device that is lost in an iteration, and whose pictures are as bright as it has done iterations.
     struct Lost {
-        iterations: u32,
+        figures: Figures,
         lost_in: u32,
         is_lost: bool,
         /// Whether its memory can still be read.
@@ -238,7 +238,7 @@ mod tests {
 
     fn lost_in(iteration: u32, is_readable: bool) -> Lost {
         Lost {
-            iterations: 0,
+            figures: Figures::default(),
             lost_in: iteration,
             is_lost: false,
             is_readable,
@@ -248,14 +248,18 @@ mod tests {
 
     impl Backend for Lost {
         fn iterate_unless(&mut self, stop: &dyn Fn() -> bool) -> Result<Option<Run>> {
-            if self.iterations + 1 == self.lost_in {
+            if self.iterations() + 1 == self.lost_in {
                 self.is_lost = true;
                 return Err(Error::Device("the device is lost".to_owned()));
             }
-            if self.iterations > 0 && stop() {
+            if self.iterations() > 0 && stop() {
                 return Ok(None);
             }
-            self.iterations += 1;
+            self.figures.totals.add(Totals {
+                iterations: 1,
+                emitted: 10,
+                camera_paths: 1,
+            });
             Ok(Some(Run::default()))
         }
 
@@ -264,7 +268,7 @@ mod tests {
                 return Err(Error::Device("the device is lost".to_owned()));
             }
             std::thread::sleep(self.resolving);
-            let pixel = [self.iterations as f32; 4];
+            let pixel = [self.iterations() as f32; 4];
             Ok(Resolved::from_film(
                 [1, 1],
                 &[pixel],
@@ -275,33 +279,17 @@ mod tests {
 
         fn save(&mut self) -> Result<Blocks> {
             let mut blocks = Blocks::default();
-            blocks.put("iterations", &self.iterations)?;
+            blocks.put("iterations", &self.iterations())?;
             Ok(blocks)
         }
 
         fn restore(&mut self, learned: &Blocks) -> Result<()> {
-            self.iterations = learned.get("iterations")?;
+            self.figures.totals.iterations = learned.get("iterations")?;
             Ok(())
         }
 
-        fn totals(&self) -> Totals {
-            Totals {
-                iterations: self.iterations,
-                emitted: 10 * u64::from(self.iterations),
-                camera_paths: self.iterations,
-            }
-        }
-
-        fn counters(&self) -> Counters {
-            Counters::default()
-        }
-
-        fn radius(&self) -> f32 {
-            1.0
-        }
-
-        fn photon_flux(&self) -> Option<f64> {
-            None
+        fn figures(&self) -> &Figures {
+            &self.figures
         }
 
         fn aims(&self) -> bool {
@@ -426,6 +414,6 @@ mod tests {
         let mut device = lost_in(u32::MAX, true);
         assert_eq!(twenty(&mut device).expect("a picture").iterations, 20);
         let more = run(&mut device, Until::iterations(23), &|| false).expect("a picture");
-        assert_eq!((more.iterations, device.iterations), (23, 23));
+        assert_eq!((more.iterations, device.iterations()), (23, 23));
     }
 }

@@ -18,7 +18,7 @@ impl Renderer {
             // The pilot is one batch; a whole iteration has a higher density.
             let share = batch as f32 / self.config.photons as f32;
             let (photons, _) = self.trace_photon_paths(radius::PILOT, 0..batch);
-            self.photon_flux = radius::mean_flux(&photons);
+            self.figures.photon_flux = radius::mean_flux(&photons);
             let seen = self.paths.iter().flat_map(|path| &path.points);
             let as_on_device = seen.map(|point| {
                 let packed = layout::VisiblePoint {
@@ -59,7 +59,7 @@ impl Renderer {
             .filter(|&radius2| radius2 > 0.0)
             .collect();
         radii2.sort_unstable_by(f64::total_cmp);
-        self.radius = radii2
+        self.figures.radius = radii2
             .get(radii2.len() / 2)
             .map_or(0.0, |radius2| radius2.sqrt() as f32);
         Ok(())

@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Renderer;
-use crate::backend::Counters;
-use crate::config::Totals;
+use crate::backend::Figures;
 use crate::cpu::slots::{Pixel, Slot};
 use crate::error::Result;
 use crate::random::CameraTurn;
@@ -16,10 +15,7 @@ const RENDER: &str = "cpu render";
 #[derive(Serialize, Deserialize)]
 struct Learned {
     first_footprints: [f32; 2],
-    radius: f32,
-    photon_flux: Option<f64>,
-    totals: Totals,
-    counters: Counters,
+    figures: Figures,
     pixels: Vec<Pixel>,
     slots: Vec<Slot>,
 }
@@ -28,10 +24,7 @@ impl Renderer {
     pub(super) fn learned(&self) -> Result<Blocks> {
         let learned = Learned {
             first_footprints: self.settings.first_footprints,
-            radius: self.radius,
-            photon_flux: self.photon_flux,
-            totals: self.totals,
-            counters: self.counters,
+            figures: self.figures,
             pixels: self.pixels.clone(),
             slots: self.slots.clone(),
         };
@@ -43,13 +36,10 @@ impl Renderer {
     pub(super) fn continue_from(&mut self, learned: &Blocks) -> Result<()> {
         let learned: Learned = learned.get(RENDER)?;
         self.settings.first_footprints = learned.first_footprints;
-        self.radius = learned.radius;
-        self.photon_flux = learned.photon_flux;
-        self.totals = learned.totals;
-        self.counters = learned.counters;
+        self.figures = learned.figures;
         self.pixels = learned.pixels;
         self.slots = learned.slots;
-        if let Some(turn) = CameraTurn::last(&self.config, self.totals) {
+        if let Some(turn) = CameraTurn::last(&self.config, self.figures.totals) {
             self.paths = self.trace_camera_paths(turn);
         }
         Ok(())
