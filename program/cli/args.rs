@@ -1,6 +1,6 @@
 //! Command line arguments.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -12,7 +12,7 @@ use super::converge::ConvergeArguments;
 use super::events::ProgressFormat;
 use super::manual::Manual;
 use super::merge::MergeArguments;
-use super::outputs::named;
+use super::outputs::{PictureFiles, named};
 use super::scene::SceneArguments;
 use super::serve;
 use super::view::{self, Address};
@@ -248,6 +248,17 @@ pub struct RenderArguments {
     /// No progress bar.
     #[arg(long)]
     pub quiet: bool,
+}
+
+impl RenderArguments {
+    /// The files of the picture.
+    pub fn picture_files(&self, output: &Path) -> PictureFiles {
+        PictureFiles {
+            exr: output.to_owned(),
+            png: self.png.clone(),
+            look: self.look.into(),
+        }
+    }
 }
 
 /// A parser of the names of a setting's values.

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Error, Result};
+use anyhow::{Context, Result};
 use clap::Args;
 
 use super::Outcome;
 use super::args::{LookArguments, exr_file, png_file};
-use super::outputs::{all, check_outputs, named};
+use super::outputs::{PictureFiles, all, check_outputs, named};
 use ppm_vk::internals::files::Writing;
 use ppm_vk::{Merge, Rendered, State};
 
@@ -52,18 +52,14 @@ pub fn run(arguments: &MergeArguments) -> Result<Outcome> {
     let rendered = merge.rendered();
     say_merged(&merge, &rendered, &arguments.output);
     let _writing = Writing::begin();
-    let written = [
-        Some(rendered.write_exr(&arguments.output)),
-        arguments
-            .png
-            .as_ref()
-            .map(|png| rendered.write_png(png, arguments.look.into())),
-        arguments.state.as_ref().map(|file| merge.state()?.write(file)),
-    ];
-    all(written
-        .into_iter()
-        .flatten()
-        .map(|written| written.map_err(Error::from)))?;
+    let files = PictureFiles {
+        exr: arguments.output.clone(),
+        png: arguments.png.clone(),
+        look: arguments.look.into(),
+    };
+    let state = arguments.state.as_ref();
+    let state = state.map(|file| Ok(merge.state()?.write(file)?));
+    all(files.write(&rendered, |_| ()).into_iter().chain(state))?;
     Ok(Outcome::Done)
 }
 

@@ -1,12 +1,13 @@
 //! The files that a command writes.
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, iter};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Error, Result, bail, ensure};
 
 use super::advice;
 use ppm_vk::internals::files::check_writable;
+use ppm_vk::{Look, Rendered};
 
 /// The identities of a path: two paths are the same file if any of these is equal.
 struct Place {
@@ -80,6 +81,25 @@ pub fn check_outputs<'a>(inputs: &[&Path], outputs: impl Iterator<Item = &'a Pat
         taken.push((output, "writes too", place));
     }
     outputs.into_iter().try_for_each(|output| Ok(check_writable(output)?))
+}
+
+/// The picture files of a command.
+#[derive(Debug, Clone)]
+pub struct PictureFiles {
+    pub exr: PathBuf,
+    pub png: Option<PathBuf>,
+    pub look: Look,
+}
+
+impl PictureFiles {
+    /// Writes each, even if another fails; `written` is called for each that is written.
+    pub fn write(&self, rendered: &Rendered, written: impl Fn(&Path)) -> Vec<Result<()>> {
+        let tell = |result: ppm_vk::Result<()>, file: &Path| result.map(|()| written(file)).map_err(Error::from);
+        let exr = tell(rendered.write_exr(&self.exr), &self.exr);
+        let png = self.png.as_deref();
+        let png = png.map(|file| tell(rendered.write_png(file, self.look), file));
+        iter::once(exr).chain(png).collect()
+    }
 }
 
 /// Fails if any of these failed, with all failures in one line: one failed output does not stop the others.

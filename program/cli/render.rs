@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Context, Error, Result};
+use anyhow::{Context, Result};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 use glam::Vec2;
@@ -198,27 +198,25 @@ fn is_device_lost(rendered: &ppm_vk::Result<Rendered>) -> bool {
 /// All failures, including that of the render, in one line.
 fn write_outputs(arguments: &RenderArguments, events: &Events, output: &Path, rendered: &Rendered) -> Result<()> {
     let _writing = Writing::begin();
-    let tell = |written: Result<()>, file: &Path| written.map(|()| events.written(file, rendered.iterations()));
-    let picture = tell(rendered.write_exr(output).map_err(Error::from), output);
-    if picture.is_ok() {
+    let iterations = rendered.iterations();
+    let pictures = arguments
+        .picture_files(output)
+        .write(rendered, |file| events.written(file, iterations));
+    if pictures[0].is_ok() {
         say_rendered(output, rendered);
     }
-    let (png, profile, subject) = (arguments.png.as_ref(), rendered.profile(), rendered.subject());
+    let (profile, subject) = (rendered.profile(), rendered.subject());
     let json = |file: &Option<PathBuf>, value: &dyn Fn() -> serde_json::Value| {
-        file.as_ref().map(|file| tell(write_json(file, &value()), file))
+        file.as_ref()
+            .map(|file| write_json(file, &value()).map(|()| events.written(file, iterations)))
     };
     let written = [
         rendered.failure().map(|failure| Err(advice::of_failure(failure))),
-        Some(picture),
-        png.map(|file| {
-            let written = rendered.write_png(file, arguments.look.into());
-            tell(written.map_err(Error::from), file)
-        }),
         arguments.profile.then(|| print_profile(arguments, rendered)),
         json(&arguments.profile_json, &|| profile.json(subject)),
         json(&arguments.trace, &|| profile.trace(subject)),
     ];
-    all(written.into_iter().flatten())
+    all(pictures.into_iter().chain(written.into_iter().flatten()))
 }
 
 /// Prints the profile to stdout; where that has events only, to stderr, unless it goes to a file.

@@ -10,9 +10,9 @@ use anyhow::{Error, Result};
 use super::advice;
 use super::args::RenderArguments;
 use super::events::Events;
-use super::outputs::all;
+use super::outputs::{PictureFiles, all};
 use super::takers::{Mailbox, Pace, Taker};
-use ppm_vk::{Look, Rendered, Snapshot, Wanted};
+use ppm_vk::{Rendered, Snapshot, Wanted};
 
 /// Time from one save to the next where a state is kept.
 const DEFAULT_EVERY: Duration = Duration::from_secs(60);
@@ -20,9 +20,7 @@ const DEFAULT_EVERY: Duration = Duration::from_secs(60);
 /// The files of a save.
 #[derive(Debug, Clone)]
 struct Files {
-    exr: PathBuf,
-    png: Option<PathBuf>,
-    look: Look,
+    pictures: PictureFiles,
     state: Option<PathBuf>,
 }
 
@@ -41,9 +39,7 @@ impl Saver {
             .save_every
             .or(arguments.state.is_some().then_some(DEFAULT_EVERY))?;
         let files = Files {
-            exr: output.to_owned(),
-            png: arguments.png.clone(),
-            look: arguments.look.into(),
+            pictures: arguments.picture_files(output),
             state: arguments.state.clone(),
         };
         let snapshots = Arc::new(Mailbox::default());
@@ -91,21 +87,15 @@ impl Taker for Saver {
 
 impl Files {
     fn write(&self, snapshot: &Snapshot, events: &Events) -> Result<()> {
-        let rendered = &snapshot.rendered;
-        let tell = |written: ppm_vk::Result<()>, file: &Path| {
-            written
-                .map(|()| events.written(file, rendered.iterations()))
-                .map_err(Error::from)
-        };
-        let (png, state) = (self.png.as_deref(), self.state.as_deref());
-        let written = [
-            Some(tell(rendered.write_exr(&self.exr), &self.exr)),
-            png.map(|file| tell(rendered.write_png(file, self.look), file)),
-            // Last: pictures are never older than the state.
-            state
-                .zip(snapshot.state.as_ref())
-                .map(|(file, state)| tell(state.write(file), file)),
-        ];
-        all(written.into_iter().flatten())
+        let iterations = snapshot.rendered.iterations();
+        let mut written = self
+            .pictures
+            .write(&snapshot.rendered, |file| events.written(file, iterations));
+        // Last: pictures are never older than the state.
+        if let Some((file, state)) = self.state.as_deref().zip(snapshot.state.as_ref()) {
+            let state = state.write(file).map(|()| events.written(file, iterations));
+            written.push(state.map_err(Error::from));
+        }
+        all(written)
     }
 }
