@@ -1,5 +1,7 @@
 //! Tone mappers: radiance to what a display shows.
 
+use std::sync::LazyLock;
+
 use glam::{DMat3, DVec3};
 
 use super::Image;
@@ -119,6 +121,8 @@ const TO_REC_2020: DMat3 = DMat3::from_cols(
     DVec3::new(0.3293, 0.9195, 0.0880),
     DVec3::new(0.0433, 0.0113, 0.8956),
 );
+/// The inverse.
+static FROM_REC_2020: LazyLock<DMat3> = LazyLock::new(|| TO_REC_2020.inverse());
 /// AgX turns and shrinks the primaries before its curve, so that saturated bright colours turn white; and back behind it.
 const AGX_INSET: DMat3 = DMat3::from_cols(
     DVec3::new(0.856_627_153_315_983, 0.137_318_972_929_847, 0.111_898_212_999_95),
@@ -160,7 +164,7 @@ fn agx(color: [f32; 3]) -> [f32; 3] {
     let shown = (AGX_OUTSET * signal)
         .max(DVec3::ZERO)
         .map(|value| value.powf(AGX_GAMMA));
-    let display = TO_REC_2020.inverse() * shown;
+    let display = *FROM_REC_2020 * shown;
     display.clamp(DVec3::ZERO, DVec3::ONE).as_vec3().to_array()
 }
 
