@@ -5,7 +5,7 @@ mod program;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -13,13 +13,15 @@ use ppm_vk::{Image, compare, read_exr};
 use program::{ppm_vk, stderr};
 use tempfile::TempDir;
 
+fn run(folder: &TempDir, name: &str, more: &[&str]) -> Output {
+    let arguments = arguments(name, more);
+    ppm_vk(folder.path(), &arguments.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
 /// Renders a scene of `scenes/` in a folder; returns what the program told.
 #[track_caller]
 fn render(folder: &TempDir, name: &str, more: &[&str]) -> String {
-    let output = ppm_vk(
-        folder.path(),
-        &arguments(name, more).iter().map(String::as_str).collect::<Vec<_>>(),
-    );
+    let output = run(folder, name, more);
     assert_eq!(output.status.code(), Some(0), "{more:?}: {}", stderr(&output));
     stderr(&output)
 }
@@ -27,10 +29,7 @@ fn render(folder: &TempDir, name: &str, more: &[&str]) -> String {
 /// The one line of a render that fails.
 #[track_caller]
 fn failure(folder: &TempDir, name: &str, more: &[&str]) -> String {
-    let output = ppm_vk(
-        folder.path(),
-        &arguments(name, more).iter().map(String::as_str).collect::<Vec<_>>(),
-    );
+    let output = run(folder, name, more);
     let text = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{more:?}: {text}");
     let errors: Vec<&str> = text.lines().filter(|line| line.starts_with("error: ")).collect();

@@ -90,20 +90,26 @@ fn add_lights(scene: &mut Scene) {
     scene.environment = Some(Environment::new(image).expect("an environment").rotated(77.0));
 }
 
+/// Adds a square texture without filtering that is repeated this many times over a unit of its coordinates; returns its index.
+fn add_texture(scene: &mut Scene, side: u32, repeats: f32, texel: impl Fn(u32) -> u32) -> u32 {
+    let lookup = TextureLookup {
+        row_u: [repeats, 0.0, 0.0],
+        row_v: [0.0, repeats, 0.0],
+        first_texel: scene.textures.texels.len() as u32,
+        size: side | side << 16,
+        flags: NEAREST,
+        ..TextureLookup::zeroed()
+    };
+    scene.textures.texels.extend((0..side * side).map(texel));
+    scene.textures.lookups.push(lookup);
+    scene.textures.lookups.len() as u32 - 1
+}
+
 /// Gives emissive surfaces a texture of which one texel in 32 is bright. It is not filtered: near 0 only rounding errors would
 /// remain.
 fn add_pattern(scene: &mut Scene) {
-    const SIDE: u32 = 32;
-    let mut lookup = TextureLookup::zeroed();
-    lookup.row_u = [4.0, 0.0, 0.0];
-    lookup.row_v = [0.0, 4.0, 0.0];
-    lookup.first_texel = scene.textures.texels.len() as u32;
-    lookup.size = SIDE | SIDE << 16;
-    lookup.flags = NEAREST;
     let texel = |i: u32| if (i * 7) % 32 == i / 32 % 8 { u32::MAX } else { 0 };
-    scene.textures.texels.extend((0..SIDE * SIDE).map(texel));
-    scene.textures.lookups.push(lookup);
-    let texture = scene.textures.lookups.len() as u32 - 1;
+    let texture = add_texture(scene, 32, 4.0, texel);
     for material in scene
         .materials
         .iter_mut()
@@ -122,22 +128,14 @@ fn add_pattern(scene: &mut Scene) {
 
 /// Makes materials anisotropic, in a direction and by a strength that a texture has.
 fn brush(scene: &mut Scene) {
-    const SIDE: u32 = 8;
-    let mut lookup = TextureLookup::zeroed();
-    lookup.row_u = [1.0, 0.0, 0.0];
-    lookup.row_v = [0.0, 1.0, 0.0];
-    lookup.first_texel = scene.textures.texels.len() as u32;
-    lookup.size = SIDE | SIDE << 16;
-    lookup.flags = NEAREST;
     let texel = |i: u32| {
         let (sin, cos) = (i as f32).sin_cos();
         let byte = |value: f32| (255.0 * value).round() as u32;
         byte(0.5 + 0.5 * cos) | byte(0.5 + 0.5 * sin) << 8 | byte(1.0 - i as f32 / 80.0) << 16
     };
-    scene.textures.texels.extend((0..SIDE * SIDE).map(texel));
-    scene.textures.lookups.push(lookup);
+    let texture = add_texture(scene, 8, 1.0, texel);
     for material in &mut scene.materials {
-        material.textures.anisotropy = Some(scene.textures.lookups.len() as u32 - 1);
+        material.textures.anisotropy = Some(texture);
         material.layers.anisotropy.strength = 0.8;
         material.layers.anisotropy.rotation = 0.7;
     }

@@ -2,7 +2,7 @@
 
 use std::io::Read as _;
 use std::net::{TcpListener, TcpStream};
-use std::thread;
+use std::thread::{self, JoinHandle};
 
 use super::{run, stderr, written};
 
@@ -111,14 +111,20 @@ fn receive(stream: &mut TcpStream) -> Option<Packet> {
     Some(Fields(&bytes).packet())
 }
 
-#[test]
-fn a_viewer_gets_the_picture_as_it_goes_on_and_the_last_to_the_bit() {
+/// A viewer of one connection: its address, and the packets that it gets.
+fn receiver() -> (String, JoinHandle<Vec<Packet>>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address").to_string();
-    let receiver = thread::spawn(move || {
+    let packets = thread::spawn(move || {
         let (mut stream, _) = listener.accept().expect("a connection");
-        std::iter::from_fn(|| receive(&mut stream)).collect::<Vec<_>>()
+        std::iter::from_fn(|| receive(&mut stream)).collect()
     });
+    (address, packets)
+}
+
+#[test]
+fn a_viewer_gets_the_picture_as_it_goes_on_and_the_last_to_the_bit() {
+    let (address, receiver) = receiver();
     let folder = tempfile::tempdir().expect("a folder");
     let output = run(folder.path(), &["--time", "3", "--view", &address]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -151,12 +157,7 @@ fn a_viewer_gets_the_picture_as_it_goes_on_and_the_last_to_the_bit() {
 
 #[test]
 fn large_pictures_come_in_bands_that_cover_them() {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let address = listener.local_addr().expect("an address").to_string();
-    let receiver = thread::spawn(move || {
-        let (mut stream, _) = listener.accept().expect("a connection");
-        std::iter::from_fn(|| receive(&mut stream)).collect::<Vec<_>>()
-    });
+    let (address, receiver) = receiver();
     let folder = tempfile::tempdir().expect("a folder");
     let arguments = ["--iterations", "1", "--view", &address, "--resolution", "400x300"];
     let output = run(folder.path(), &arguments);
