@@ -37,10 +37,9 @@ float joint_masking(float alpha, float nv, float nl) {
 vec3 visible_normal(vec2 alpha, mat3 frame, vec3 v, vec2 u) {
     vec3 local = v * frame;
     vec3 stretched = normalize(vec3(alpha * local.xy, local.z));
-    float phi = 2.0 * PI * u.x;
     float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
     float sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
-    vec3 cap = vec3(sine * cos(phi), sine * sin(phi), z) + stretched;
+    vec3 cap = vec3(sine * unit_vector_at(u.x), z) + stretched;
     return normalize(frame * normalize(vec3(alpha * cap.xy, max(cap.z, 1e-6))));
 }
 

@@ -11,6 +11,19 @@ mat3 basis(vec3 n) {
     return mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n);
 }
 
+// Cosine and sine of an angle, in turns from −2 to 2. By polynomials within an eighth of a turn (Cephes' sinf and cosf): the
+// built-in functions may be wrong by 2^-11, and on some devices they are.
+vec2 unit_vector_at(float turns) {
+    float quarters = roundEven(4.0 * turns);
+    float x = 2.0 * PI * (turns - 0.25 * quarters);
+    float xx = x * x;
+    float s = x + x * xx * (-1.6666654611e-1 + xx * (8.3321608736e-3 - xx * 1.9515295891e-4));
+    float c = 1.0 - 0.5 * xx + xx * xx * (4.166664568298827e-2 + xx * (-1.388731625493765e-3 + xx * 2.443315711809948e-5));
+    int quarter = int(quarters);
+    vec2 unit = (quarter & 1) == 0 ? vec2(c, s) : vec2(-s, c);
+    return (quarter & 2) == 0 ? unit : -unit;
+}
+
 // A point uniform on the unit disc: Shirley and Chiu, «A Low Distortion Map Between Disk and Square», Journal of Graphics
 // Tools 2(3), 1997. A small square of numbers stays compact.
 vec2 disc_point(vec2 u) {
@@ -18,9 +31,8 @@ vec2 disc_point(vec2 u) {
     bool wide = abs(p.x) > abs(p.y);
     float radius = wide ? p.x : p.y;
     float other = wide ? p.y : p.x;
-    float turn = 0.25 * PI * (other / (radius == 0.0 ? 1.0 : radius));
-    float phi = wide ? turn : 0.5 * PI - turn;
-    return radius * vec2(cos(phi), sin(phi));
+    float turns = 0.125 * (other / (radius == 0.0 ? 1.0 : radius));
+    return radius * unit_vector_at(wide ? turns : 0.25 - turns);
 }
 
 // A direction around the unit vector n with density cos θ / π (Malley's method).

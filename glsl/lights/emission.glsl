@@ -34,8 +34,7 @@ struct AimedStart {
 // A direction around an axis, with 1 − cos of the angle between them.
 vec3 direction_off(vec3 axis, float versine, float turn) {
     float across = sqrt(max(0.0, versine * (2.0 - versine)));
-    float phi = 2.0 * PI * turn;
-    return normalize(basis(axis) * vec3(across * cos(phi), across * sin(phi), 1.0 - versine));
+    return normalize(basis(axis) * vec3(across * unit_vector_at(turn), 1.0 - versine));
 }
 
 // 1 − cos of a photon's angle from a spot's axis, sampled so that all photons have the same flux, and the solid angle that gives

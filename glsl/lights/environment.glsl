@@ -97,8 +97,8 @@ EnvironmentSample sample_environment(vec2 u, out vec3 direction) {
     float up = mix(edges.x, edges.y, row.within);
     float across = sqrt(max(0.0, (1.0 - up) * (1.0 + up)));
     float turn = float(column.index) + column.within;
-    float phi = 2.0 * PI * (turn / float(size.x) - 0.5 - environment_rotation());
-    direction = normalize(vec3(-across * sin(phi), up, across * cos(phi)));
+    vec2 around = across * unit_vector_at(turn / float(size.x) - 0.5 - environment_rotation());
+    direction = normalize(vec3(-around.y, up, around.x));
     return EnvironmentSample(environment_radiance(size, vec2(turn, rows_below_pole(size, across, up))),
                row.probability * column.probability / solid_angle_of_pixel(size, edges));
 }
