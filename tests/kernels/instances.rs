@@ -202,24 +202,31 @@ fn picture(scene: &Scene, packed: &PackedScene, iterations: u32, seed: u32) -> I
     renderer.resolve().expect("a picture")
 }
 
-/// The same paths: only the few that rounding deflects differ. `most`: relMSE as a share of that of pictures with other paths.
+/// The same paths: only the few that rounding deflects differ. `most`: mean absolute error, as a share of that
+/// of a picture with another seed. relMSE would be that of the one brightest photon that is deflected.
 fn assert_same_picture(shared: &Scene, apart: &Scene, iterations: u32, most: f64) {
     let (packed_shared, mut packed_apart) = (packed(shared), packed(apart));
     assert!(packed_shared.features.instanced && !packed_apart.features.instanced);
     order_lamp(&mut packed_apart, &packed_shared);
     let expected = picture(apart, &packed_apart, iterations, 0);
-    let rel_mse = |seed: u32| {
+    let error = |seed: u32| {
         let found = picture(shared, &packed_shared, iterations, seed);
-        compare(&found, &expected).expect("pictures of one size").rel_mse
+        compare(&found, &expected).expect("pictures of one size").mae
     };
-    let (rounding, noise) = (rel_mse(0), rel_mse(1));
-    println!("relMSE {rounding:e}, with another seed {noise:e}: {}", rounding / noise);
-    assert!(rounding < most * noise, "relMSE {rounding:e}, with another seed {noise:e}");
+    let (rounding, noise) = (error(0), error(1));
+    println!(
+        "mean absolute error {rounding:e}, of another seed {noise:e}: {}",
+        rounding / noise
+    );
+    assert!(
+        rounding < most * noise,
+        "mean absolute error {rounding:e}, of another seed {noise:e}"
+    );
 }
 
 #[test]
 fn the_picture_of_instances_is_that_of_meshes_of_their_own() {
-    assert_same_picture(&scene("instances"), &apart(), 8, 0.005);
+    assert_same_picture(&scene("instances"), &apart(), 8, 0.02);
 }
 
 /// f32 is precise near the floor: the instance's own coordinates do not show how far rounding can move its bottom.
@@ -268,6 +275,6 @@ fn glass_instances_stand_on_a_floor_through_the_middle_of_the_scene() {
     let bottoms: Vec<f32> = bottoms.collect();
     println!("{bottoms:?}");
     assert!(bottoms.iter().any(|&y| y > 0.0 && y < 1e-8));
-    // Light takes many paths through this much glass. Without the reach of instances it is 0.12.
-    assert_same_picture(&shared, &apart, 48, 0.05);
+    // Light takes many paths through this much glass. Where no face is known to touch another it is 0.38.
+    assert_same_picture(&shared, &apart, 48, 0.1);
 }
