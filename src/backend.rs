@@ -5,7 +5,9 @@ use crate::config::SEQUENCES;
 use crate::config::{RenderConfig, Totals};
 use crate::error::Result;
 use crate::film::Image;
-use crate::layout::{BehindGlass, Settings};
+#[cfg(doc)]
+use crate::layout::IDS_OF_PIXEL;
+use crate::layout::{BehindGlass, IdCount, LightParts, Settings, SurfaceSum};
 use crate::metrics;
 use crate::packing::PackedScene;
 use crate::radius::{MOST_FOOTPRINTS, PILOT_FOOTPRINTS};
@@ -117,6 +119,19 @@ pub struct Resolved {
     pub behind_glass: Vec<BehindGlass>,
     /// RGB and curvature of each pixel by the iterations of each of [`SEQUENCES`] alone: one picture after another.
     pub sequences: Vec<[f32; 4]>,
+    /// Data for layers.
+    pub layers: LayerFilms,
+}
+
+/// Data for a picture's layers, in rows from the top left; empty if no layer needs it.
+#[derive(Debug, Clone, Default)]
+pub struct LayerFilms {
+    /// What camera paths meet.
+    pub surfaces: Vec<SurfaceSum>,
+    /// [`IDS_OF_PIXEL`] objects and as many materials a pixel.
+    pub ids: Vec<IdCount>,
+    /// Radiance by the way that light takes.
+    pub light: Vec<LightParts>,
 }
 
 impl Resolved {
@@ -134,6 +149,7 @@ impl Resolved {
             waits: film.iter().map(|pixel| pixel[3] < 0.0).collect(),
             behind_glass,
             sequences,
+            layers: LayerFilms::default(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod choice;
 mod filter;
+mod layers;
 mod part;
 pub mod ranges;
 mod tiles;
@@ -9,6 +10,7 @@ mod tiles;
 pub use choice::Choice;
 pub(crate) use choice::choices;
 pub use filter::PixelFilter;
+pub use layers::{Layer, Layers};
 pub use part::Part;
 pub use tiles::pixel_of;
 
@@ -145,6 +147,8 @@ pub struct RenderConfig {
     pub seed: u32,
     /// How a pixel weighs the film around its centre, by the estimator `sppm`; `ppm` has the centre alone.
     pub filter: PixelFilter,
+    /// What the picture's file has beside the colours.
+    pub layers: Layers,
     /// Which of several independent parts it renders.
     pub part: Part,
 }
@@ -213,6 +217,7 @@ impl RenderConfig {
         sampler: Sampler::of(Estimator::Sppm),
         seed: 0,
         filter: PixelFilter::Box,
+        layers: Layers::NONE,
         part: Part::WHOLE,
     };
 

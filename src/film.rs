@@ -2,14 +2,16 @@
 //!
 //! An output file is whole or absent. [`check_writable`] tells before the rendering whether it can be written.
 
+mod cryptomatte;
 mod hdr;
 mod openexr;
 mod png;
 mod tone;
 
 pub use crate::files::{check_writable, write_whole};
+pub use cryptomatte::Cryptomatte;
 pub use hdr::{hdr_pixels, read_hdr};
-pub use openexr::{Layers, exr_pixels, read_exr, write_exr};
+pub use openexr::{Additions, Channel, exr_pixels, read_exr, write_exr};
 pub use png::{write_png, write_rgb8};
 pub use tone::{Exposure, Look, Tone};
 

@@ -81,7 +81,8 @@ mod text;
 
 pub use backend::{Counters, DeviceDescription, Phase};
 pub use config::{
-    Accel, Choice, Direct, EmissionChoice, Estimator, Part, PixelFilter, RenderConfig, Sampler, TriangleTest,
+    Accel, Choice, Direct, EmissionChoice, Estimator, Layer, Layers, Part, PixelFilter, RenderConfig, Sampler,
+    TriangleTest,
 };
 pub use error::{Error, Remedy, Result, Setting};
 pub use estimate::RelativeError;

@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{EmissionChoice, Estimator, RenderConfig};
+use crate::config::{EmissionChoice, Estimator, Layers, RenderConfig};
 use crate::layout::{
-    BehindGlass, Centroid, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, GridShape, PathStart,
-    Photon, SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters, TILE, VisibleLobes, VisiblePoint,
-    packed_bsdf_texels,
+    BehindGlass, Centroid, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, GridShape, IDS_OF_PIXEL,
+    IdCount, LightParts, PathStart, Photon, SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters,
+    SurfaceSum, TILE, VisibleLobes, VisiblePoint, packed_bsdf_texels,
 };
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
 
@@ -72,6 +72,8 @@ pub struct Sizes {
     pub cell_photons: Option<u32>,
     /// Whether photon paths are aimed.
     pub aimed: bool,
+    /// Layers of the picture.
+    pub layers: Layers,
     /// Options of benches for gathers.
     pub probe: Probe,
 }
@@ -161,6 +163,7 @@ impl Sizes {
             },
             lobes: limits.lobes,
             aimed: config.emission == EmissionChoice::Aimed,
+            layers: config.layers,
             cell_photons: config.cell_photons,
             probe: Probe::default(),
         };
@@ -249,6 +252,12 @@ impl Sizes {
             BufferId::Film => (pixels, 16),
             id if SEQUENCE_FILMS.contains(&id) => (pixels, 16),
             BufferId::GlassFilm => (pixels, size_of::<BehindGlass>()),
+            BufferId::LightPartsFilm => (
+                if self.layers.show_light() { pixels } else { 1 },
+                size_of::<LightParts>(),
+            ),
+            BufferId::SurfaceSums => (pixels, size_of::<SurfaceSum>()),
+            BufferId::IdCounts => (2 * u64::from(IDS_OF_PIXEL) * pixels, size_of::<IdCount>()),
             BufferId::Status => (1, size_of::<StatusCounters>()),
             BufferId::Grid => (1, size_of::<GridShape>()),
             BufferId::PhotonCount | BufferId::PointCount | BufferId::ScanTotal => (1, 4),

@@ -142,6 +142,12 @@ pub enum BufferId {
     Film,
     /// [`crate::layout::BehindGlass`] of each pixel, row-major from the top left.
     GlassFilm,
+    /// [`crate::layout::LightParts`] of each pixel, if they are wanted, row-major from the top left.
+    LightPartsFilm,
+    /// [`crate::layout::SurfaceSum`] of each pixel, if layers show surfaces, row-major from the top left.
+    SurfaceSums,
+    /// [`crate::layout::IdCount`]s of each pixel, likewise: of objects, then of materials.
+    IdCounts,
     /// As [`BufferId::Film`], of the iterations of one sequence.
     Sequence0Film,
     /// Likewise of the next one.

@@ -875,7 +875,7 @@ fn values_of_an_environment_that_are_no_radiance_are_counted() {
     };
     ppm_vk::internals::film::write_exr(
         &image,
-        ppm_vk::internals::film::Layers::default(),
+        ppm_vk::internals::film::Additions::default(),
         &folder.path().join("sky.exr"),
         &metadata,
     )

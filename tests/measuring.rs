@@ -112,7 +112,7 @@ fn compare_tells_of_nan_in_json_too() {
     let metadata = ppm_vk::internals::film::Metadata::default();
     ppm_vk::internals::film::write_exr(
         &image,
-        ppm_vk::internals::film::Layers::default(),
+        ppm_vk::internals::film::Additions::default(),
         &folder.path().join("nan.exr"),
         &metadata,
     )

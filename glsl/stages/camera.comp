@@ -8,6 +8,8 @@ layout(local_size_x = 64) in;
 #include "settings.glsl"
 #include "common/texel.glsl"
 #include "common/random.glsl"
+#include "common/sampling.glsl"
+#include "common/camera.glsl"
 #include "trace/interaction.glsl"
 #include "bsdf/bsdf.glsl"
 #include "lights/environment.glsl"
@@ -18,9 +20,6 @@ layout(local_size_x = 64) in;
 // Visible points per pixel. Above 1, glass splits the path as long as a slot is free (the paper's estimator, whose visible points
 // are found once and have to cover both branches).
 layout(constant_id = 1) const uint SLOTS = 1u;
-layout(constant_id = 2) const bool JITTER = true;
-layout(constant_id = 35) const bool FILTERED = false;
-layout(constant_id = 19) const bool LENS = false;
 
 layout(push_constant) uniform CameraTurnPush {
     uint iteration;
@@ -67,16 +66,6 @@ void load_transmitted(inout Branch branch) {
     branch.media = kept_media(FIRST_KEPT_BY_KERNEL + 9u);
 }
 
-// The place relative to the pixel's centre that belongs to a uniform number: PixelFilter::place of src/config/filter.rs.
-float filter_place(float number) {
-    float at = sqrt(max(1.0 - abs(2.0 * number - 1.0), 0.0)) * float(FILTER_PLACES - 1u);
-    uint i = min(uint(at), FILTER_PLACES - 2u);
-    float before = settings.filter_places[i / 4u][i % 4u];
-    float behind = settings.filter_places[(i + 1u) / 4u][(i + 1u) % 4u];
-    float distance = mix(before, behind, at - float(i));
-    return number < 0.5 ? -distance : distance;
-}
-
 void main() {
     uint pixel_slot = invocation_index();
     if (pixel_slot >= pixel_slots() || status.retry != 0u) {
@@ -89,11 +78,6 @@ void main() {
         random_of_pixel(CAMERA_PATH, pixel.y * settings.resolution.x + pixel.x, CameraTurn(push.iteration, push.path, push.paths),
                         settings.seed);
     vec4 u = next4(random);
-    vec2 place = JITTER ? u.xy : vec2(0.5);
-    if (FILTERED) {
-        place = JITTER ? 0.5 + vec2(filter_place(u.x), filter_place(u.y)) : place;
-    }
-    vec2 film = (vec2(pixel) + place) / vec2(settings.resolution) * 2.0 - 1.0;
 
     uint slots_of_pixel = SLOTS;
     bool many = slots_of_pixel > 1u;
@@ -101,19 +85,7 @@ void main() {
     uint pending_count = 0u;
     uint used = 0u;
     Branch branch;
-    vec3 on_film = film.x * settings.camera_right.xyz - film.y * settings.camera_up.xyz;
-    bool parallel = settings.camera_up.w != 0.0;
-    branch.origin = settings.camera_position.xyz + (parallel ? on_film : vec3(0.0));
-    branch.direction = settings.camera_forward.xyz + (parallel ? vec3(0.0) : on_film);
-    float lens_radius = settings.camera_position.w;
-    if (LENS && lens_radius > 0.0) {
-        // All rays of a point of the picture meet in the plane of focus.
-        vec2 on_lens = lens_radius * disc_point(next4(random).xy);
-        vec3 off_axis = on_lens.x * normalize(settings.camera_right.xyz) + on_lens.y * normalize(settings.camera_up.xyz);
-        branch.origin += off_axis;
-        branch.direction = settings.camera_right.w * branch.direction - off_axis;
-    }
-    branch.direction = normalize(branch.direction);
+    sample_camera_ray(pixel, u.xy, random, branch.origin, branch.direction);
     branch.throughput = vec3(1.0);
     branch.emitted = vec3(0.0);
     branch.way = 0.0;
@@ -288,7 +260,7 @@ void main() {
             } else {
                 visible_points[slot] = no_visible_point(branch.emitted, met_surface);
             }
-            footprints[slot] = settings.pixel_spread * (parallel ? 1.0 : branch.way);
+            footprints[slot] = settings.pixel_spread * (is_orthographic() ? 1.0 : branch.way);
             used += 1u;
             alive = pending_count > 0u && !cut;
             if (alive) {

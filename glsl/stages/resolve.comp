@@ -12,6 +12,9 @@ layout(local_size_x = 64) in;
 #include "gather/statistics.glsl"
 #include "common/status.glsl"
 
+// Whether a picture for each part of the light is wanted.
+layout(constant_id = 36) const bool LIGHT_PARTS = false;
+
 layout(push_constant) uniform ResolvePush {
     uint iterations;
     float emitted; // photon paths of all iterations
@@ -24,6 +27,7 @@ layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
 layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
 layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left; w: see below
 layout(std430) writeonly buffer GlassFilm { BehindGlass glass_film[]; }; // likewise
+layout(std430) writeonly buffer LightPartsFilm { LightParts light_parts[]; }; // likewise
 
 // 64-bit addition with carry.
 void add_accepted(uint low, uint high) {
@@ -51,12 +55,14 @@ void main() {
     uint met = 0u;
     bool has_surface = false;
     bool has_photons = false;
+    LightParts parts = LightParts(vec4(0.0), vec4(0.0), vec4(0.0));
     BehindGlass glass = BehindGlass(0.0, 0.0, 0.0, 0.0, 0.0);
     for (uint i = 0u; i < settings.slots_per_pixel; i++) {
         uint slot = pixel_slot * settings.slots_per_pixel + i;
         DirectSum sum = direct_sums[slot];
         // Flux is divided by emitted photons first: both grow without bound, their quotient does not.
         radiance += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
+        parts.direct.rgb += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
         glass.unbent += unbent_of(sum);
         has_surface = has_surface || coverage[slot].surrounded > 0u;
         // The slots of a pixel share its camera paths.
@@ -74,6 +80,11 @@ void main() {
                 float area = PI * mine.radius2_high * share_of(coverage[receiver]);
                 vec3 by_photons = (mine.flux_high.rgb + mine.flux_low.rgb) / push.emitted / area;
                 radiance += by_photons;
+                if (map > 0u) {
+                    parts.caustic.rgb += by_photons;
+                } else {
+                    parts.indirect.rgb += by_photons;
+                }
                 glass.arrived += through_glass ? mean_of(by_photons) : 0.0;
             }
             if (lies_behind_glass && through_glass) {
@@ -88,6 +99,7 @@ void main() {
     if (!finite(radiance)) {
         atomicAdd(status.non_finite, 1u);
         radiance = vec3(0.0);
+        parts = LightParts(vec4(0.0), vec4(0.0), vec4(0.0));
     }
     // Alpha, the share of camera paths that met a surface; negative if a point that is not in the open has received no photon
     // yet.
@@ -96,4 +108,7 @@ void main() {
     uint index = pixel.y * settings.resolution.x + pixel.x;
     glass_film[index] = glass;
     film[index] = vec4(radiance, alpha);
+    if (LIGHT_PARTS) {
+        light_parts[index] = parts;
+    }
 }

@@ -19,8 +19,8 @@ use super::view::{self, Address};
 use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
 use ppm_vk::{
-    Accel, Choice, Direct, EmissionChoice, Estimator, Exposure, Look, Part, PixelFilter, RenderConfig, Sampler, Tone,
-    TriangleTest,
+    Accel, Choice, Direct, EmissionChoice, Estimator, Exposure, Layer, Look, Part, PixelFilter, RenderConfig, Sampler,
+    Tone, TriangleTest,
 };
 
 /// Maximum shift of the film, in units of the picture's larger side.
@@ -195,6 +195,13 @@ pub struct RenderArguments {
     /// Pixel filter.
     #[arg(long, default_value_t = RenderConfig::DEFAULT.filter, value_parser = choice::<PixelFilter>())]
     pub filter: PixelFilter,
+    /// Layers of the EXR, separated by commas: albedo, normal, depth, position, object and material (Cryptomatte), direct, indirect,
+    /// caustic, samples, error.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choice::<Layer>())]
+    pub aov: Vec<Layer>,
+    /// Name the EXR's channels as Blender names those of this view layer, such as NAME.Combined.R.
+    #[arg(long, value_name = "NAME", value_parser = view_layer)]
+    pub layer_name: Option<String>,
     /// Seed: the same seed on the same device gives the same picture, bit for bit (except with the paper's gathers that order
     /// photons by atomic counters).
     #[arg(long, value_name = "N", default_value_t = RenderConfig::DEFAULT.seed)]
@@ -256,6 +263,7 @@ impl RenderArguments {
         PictureFiles {
             exr: output.to_owned(),
             png: self.png.clone(),
+            view_layer: self.layer_name.clone(),
             look: self.look.into(),
         }
     }
@@ -341,6 +349,13 @@ pub fn png_file(name: &str) -> Result<PathBuf, String> {
         Some(extension) if extension.eq_ignore_ascii_case("png") => Ok(path),
         _ => Err("a PNG is written: its name must end in .png".to_owned()),
     }
+}
+
+pub fn view_layer(name: &str) -> Result<String, String> {
+    if name.is_empty() || name.contains('.') {
+        return Err("expected a name without a dot".to_owned());
+    }
+    Ok(name.to_owned())
 }
 
 fn exposure(text: &str) -> Result<Exposure, String> {

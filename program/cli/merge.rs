@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use super::Outcome;
-use super::args::{LookArguments, exr_file, png_file};
+use super::args::{LookArguments, exr_file, png_file, view_layer};
 use super::outputs::{PictureFiles, all, check_outputs, named};
 use ppm_vk::internals::files::Writing;
 use ppm_vk::{Merge, Rendered, State};
@@ -23,6 +23,9 @@ pub struct MergeArguments {
     /// Tone-mapped picture.
     #[arg(long, value_name = "FILE.png", value_parser = png_file)]
     pub png: Option<PathBuf>,
+    /// Name the EXR's channels as Blender names those of this view layer.
+    #[arg(long, value_name = "NAME", value_parser = view_layer)]
+    pub layer_name: Option<String>,
     #[command(flatten)]
     pub look: LookArguments,
     /// Write the sum, which can be merged with other parts.
@@ -55,6 +58,7 @@ pub fn run(arguments: &MergeArguments) -> Result<Outcome> {
     let files = PictureFiles {
         exr: arguments.output.clone(),
         png: arguments.png.clone(),
+        view_layer: arguments.layer_name.clone(),
         look: arguments.look.into(),
     };
     let state = arguments.state.as_ref();

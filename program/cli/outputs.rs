@@ -88,6 +88,7 @@ pub fn check_outputs<'a>(inputs: &[&Path], outputs: impl Iterator<Item = &'a Pat
 pub struct PictureFiles {
     pub exr: PathBuf,
     pub png: Option<PathBuf>,
+    pub view_layer: Option<String>,
     pub look: Look,
 }
 
@@ -95,7 +96,10 @@ impl PictureFiles {
     /// Writes each, even if another fails; `written` is called for each that is written.
     pub fn write(&self, rendered: &Rendered, written: impl Fn(&Path)) -> Vec<Result<()>> {
         let tell = |result: ppm_vk::Result<()>, file: &Path| result.map(|()| written(file)).map_err(Error::from);
-        let exr = tell(rendered.write_exr(&self.exr), &self.exr);
+        let exr = tell(
+            rendered.write_view_layer(&self.exr, self.view_layer.as_deref()),
+            &self.exr,
+        );
         let png = self.png.as_deref();
         let png = png.map(|file| tell(rendered.write_png(file, self.look), file));
         iter::once(exr).chain(png).collect()

@@ -289,6 +289,10 @@ fn choose_platform(arguments: &RenderArguments) -> (Platform, usize) {
         Some("--estimator ppm finds visible points once: it has no --aperture")
     } else if arguments.emission == Some(EmissionChoice::Aimed) && arguments.estimator == Estimator::Ppm {
         Some("--estimator ppm keeps all photons: its paths start by --emission power")
+    } else if arguments.aov.iter().any(|layer| layer.needs_device()) && backend == BackendChoice::Cpu {
+        Some("--backend cpu has the layers samples and error alone")
+    } else if arguments.aov.iter().any(|layer| layer.needs_device()) && !arguments.part.is_whole() {
+        Some("parts have no layers but samples and error: ppm-vk merge would leave them out")
     } else if backend == BackendChoice::Cpu && arguments.device.is_some() {
         Some("the CPU backend has no --device")
     } else {
@@ -323,6 +327,7 @@ fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> Render
         sampler: arguments.sampler.unwrap_or(Sampler::of(arguments.estimator)),
         seed: arguments.seed,
         filter: arguments.filter,
+        layers: arguments.aov.iter().copied().collect(),
         part: arguments.part,
     }
 }

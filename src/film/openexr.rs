@@ -45,29 +45,67 @@ fn custom_attributes(metadata: &Metadata) -> HashMap<Text, AttributeValue> {
     attributes
 }
 
-/// Additional channels of a picture.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Layers<'a> {
+/// A channel of a picture's file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Its name.
+    pub name: String,
+    /// A value for each pixel, in rows from the top left.
+    pub samples: Vec<f32>,
+}
+
+/// What a picture's file has beside the colours.
+#[derive(Debug, Clone, Default)]
+pub struct Additions<'a> {
     /// Channel A: the share of each pixel that shows a surface, in rows from the top left. Colours are not multiplied by it; they
     /// include the background.
     pub alpha: Option<&'a [f32]>,
     /// Channels `error_R`, `error_G`, `error_B`: the error of each pixel, as the render estimated it. Names have no dot: it would
     /// make several layers, whose pixels Blender does not read.
     pub errors: Option<&'a Image>,
+    /// Further channels.
+    pub channels: Vec<Channel>,
+    /// Further attributes, texts by their names.
+    pub attributes: Vec<(String, String)>,
+    /// Name of the view layer, as Blender names channels: `NAME.Combined.R`. Without it colours are `R`, `G`, `B`.
+    pub view_layer: Option<&'a str>,
 }
 
-/// Writes a scanline OpenEXR file: 32-bit float R, G, B and the channels of `layers`, ZIP compression over 16 lines (lossless),
-/// the chromaticities of Rec. 709, the program's version as `software`, and `metadata` as the attributes `iterations`,
+impl Additions<'_> {
+    /// Name of a colour channel.
+    fn combined(&self, component: &str) -> String {
+        self.view_layer
+            .map_or(component.to_owned(), |name| format!("{name}.Combined.{component}"))
+    }
+
+    fn error(&self, component: &str) -> String {
+        self.view_layer
+            .map_or(format!("error_{component}"), |name| format!("{name}.Error.{component}"))
+    }
+}
+
+/// The samples of an image's three components.
+fn planes(image: &Image) -> impl Iterator<Item = Vec<f32>> {
+    (0..3).map(|component| image.pixels.iter().map(|pixel| pixel[component]).collect())
+}
+
+/// Writes a scanline OpenEXR file: 32-bit float R, G, B and what is added, ZIP compression over 16 lines (lossless), the
+/// chromaticities of Rec. 709, the program's version as `software`, and `metadata` as the attributes `iterations`,
 /// `photonsEmitted`, `seed` (decimal text), `device`, `seconds` and, if known, `estimatedError` (double).
 ///
 /// The same picture and metadata give the same bytes. NaN and infinity are written as they are.
 ///
 /// # Errors
 /// As [`check_writable`](super::check_writable); further if the disk is full.
-pub fn write_exr(image: &Image, layers: Layers<'_>, path: &Path, metadata: &Metadata) -> Result<()> {
+pub fn write_exr(image: &Image, additions: Additions<'_>, path: &Path, metadata: &Metadata) -> Result<()> {
+    let mut custom = custom_attributes(metadata);
+    for (name, text) in &additions.attributes {
+        let text = AttributeValue::Text(Text::from_slice_unchecked(text.as_bytes()));
+        custom.insert(Text::from_slice_unchecked(name.as_bytes()), text);
+    }
     let attributes = LayerAttributes {
         software_name: Some(Text::from(concat!("ppm-vk ", env!("CARGO_PKG_VERSION")))),
-        other: custom_attributes(metadata),
+        other: custom,
         ..LayerAttributes::default()
     };
     let encoding = Encoding {
@@ -75,19 +113,24 @@ pub fn write_exr(image: &Image, layers: Layers<'_>, path: &Path, metadata: &Meta
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let plane = |name: &str, of: &Image, channel: usize| {
-        let samples: Vec<f32> = of.pixels.iter().map(|pixel| pixel[channel]).collect();
-        AnyChannel::new(name, FlatSamples::F32(samples))
-    };
     let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
-    for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
-        channels.push(plane(name, image, channel));
-        if let Some(errors) = layers.errors {
-            channels.push(plane(&format!("error_{name}"), errors, channel));
+    let mut add = |name: &str, samples: Vec<f32>| {
+        let name = Text::from_slice_unchecked(name.as_bytes());
+        channels.push(AnyChannel::new(name, FlatSamples::F32(samples)));
+    };
+    for (component, samples) in ["R", "G", "B"].into_iter().zip(planes(image)) {
+        add(&additions.combined(component), samples);
+    }
+    if let Some(errors) = additions.errors {
+        for (component, samples) in ["R", "G", "B"].into_iter().zip(planes(errors)) {
+            add(&additions.error(component), samples);
         }
     }
-    if let Some(alpha) = layers.alpha {
-        channels.push(AnyChannel::new("A", FlatSamples::F32(alpha.to_vec())));
+    if let Some(alpha) = additions.alpha {
+        add(&additions.combined("A"), alpha.to_vec());
+    }
+    for channel in additions.channels {
+        add(&channel.name, channel.samples);
     }
     let size = (image.width, image.height);
     let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));

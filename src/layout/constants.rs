@@ -52,6 +52,9 @@ shared_constants! {
     /// Keys per tile of the radix sort.
     pub const SORT_TILE: u32 = 2048;
 
+    /// Objects, and materials, of a pixel that are counted.
+    pub const IDS_OF_PIXEL: u32 = 8;
+
     /// Object of a slot without a visible point.
     pub const NO_OBJECT: u32 = u32::MAX;
 

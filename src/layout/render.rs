@@ -191,6 +191,40 @@ device_structs! {
         pub radius2: f32,
     }
 
+    /// Sums over a pixel's camera paths of what they meet.
+    pub struct SurfaceSum: 48 {
+        /// Of the visible points' albedo, with the tint of mirrors and glass before them.
+        pub albedo: [f32; 3],
+        /// Camera paths.
+        pub paths: u32,
+        /// Of the visible points' shading normals.
+        pub normal: [f32; 3],
+        /// Camera paths that met a surface.
+        pub hits: u32,
+        /// Not a sum: of the first surface in the pixel's centre, render space.
+        pub position: [f32; 3],
+        /// Its distance along the camera's axis; 0 where there is none.
+        pub depth: f32,
+    }
+
+    /// How many of a pixel's camera paths met an object, or a material, first.
+    pub struct IdCount: 8 {
+        /// Its index.
+        pub id: u32,
+        /// Camera paths; 0 for an unused entry.
+        pub count: u32,
+    }
+
+    /// A pixel's radiance by the way that its light takes.
+    pub struct LightParts: 48 {
+        /// Emission that is seen, and light that is sampled from the lights.
+        pub direct: [f32; 4],
+        /// By photons that have met a matte or glossy surface.
+        pub indirect: [f32; 4],
+        /// By photons that have met mirrors and glass alone.
+        pub caustic: [f32; 4],
+    }
+
     /// Statistics of the radii of the discs in a shell around the camera, see `glsl/gather/grid.glsl`.
     pub struct ShellRadii: 16 {
         /// Σ log2 R of a sample of discs, offset, in units of 1/256.

@@ -224,7 +224,15 @@ impl Renderer {
         for film in SEQUENCE_FILMS {
             sequences.extend(self.device.download::<[f32; 4]>(film, None)?);
         }
-        let resolved = Resolved::from_film(self.config.resolution, &film, behind_glass, sequences);
+        let mut resolved = Resolved::from_film(self.config.resolution, &film, behind_glass, sequences);
+        let layers = self.config.layers;
+        if layers.show_surfaces() {
+            resolved.layers.surfaces = self.device.download(BufferId::SurfaceSums, None)?;
+            resolved.layers.ids = self.device.download(BufferId::IdCounts, None)?;
+        }
+        if layers.show_light() {
+            resolved.layers.light = self.device.download(BufferId::LightPartsFilm, None)?;
+        }
         Ok((run, resolved))
     }
 

@@ -1,6 +1,7 @@
 //! Preparation of the first iteration: visible points, aiming of photon paths, radii.
 
 use super::Renderer;
+use super::saved::sums;
 use super::stages::reporting;
 use crate::backend::Counters;
 use crate::error::Result;
@@ -8,7 +9,7 @@ use crate::layout::{Photon, Statistics, VisiblePoint};
 use crate::packing::PackedScene;
 use crate::random::CameraTurn;
 use crate::record::Recording;
-use crate::stage::{BufferId, SEQUENCE_SUMS, StageDesc};
+use crate::stage::{BufferId, StageDesc};
 use crate::{radius, shaders};
 
 impl Renderer {
@@ -105,11 +106,9 @@ impl Renderer {
 
     fn reset(&mut self) -> Result<()> {
         let mut recording = reporting();
-        recording.fill(BufferId::DirectSums, 0);
-        for sums in SEQUENCE_SUMS {
+        for sums in sums(self.config.layers) {
             recording.fill(sums, 0);
         }
-        recording.fill(BufferId::CoverageOf, 0);
         recording.dispatch(StageDesc::new(&shaders::RESET, self.sizes.receivers()));
         self.run(&recording).map(|_| ())
     }

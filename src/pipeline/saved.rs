@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::Renderer;
 use super::stages::reporting;
 use crate::backend::{Backend as _, DeviceDescription, Figures};
+use crate::config::Layers;
 use crate::emission::Aim;
 use crate::error::{Error, Remedy, Result};
 use crate::random::CameraTurn;
@@ -30,9 +31,11 @@ struct Host {
 }
 
 /// The buffers that iterations add to.
-fn sums() -> impl Iterator<Item = BufferId> {
+pub(super) fn sums(layers: Layers) -> impl Iterator<Item = BufferId> {
     let of_slots = [BufferId::StatisticsOf, BufferId::DirectSums, BufferId::CoverageOf];
-    of_slots.into_iter().chain(SEQUENCE_SUMS)
+    let of_layers = [BufferId::SurfaceSums, BufferId::IdCounts];
+    let of_layers = of_layers.into_iter().filter(move |_| layers.show_surfaces());
+    of_slots.into_iter().chain(SEQUENCE_SUMS).chain(of_layers)
 }
 
 impl Renderer {
@@ -51,7 +54,7 @@ impl Renderer {
         };
         let mut blocks = Blocks::default();
         blocks.put(HOST, &host)?;
-        for id in sums() {
+        for id in sums(self.config.layers) {
             blocks.put_bytes(&format!("{id:?}"), self.device.download(id, None)?);
         }
         Ok(blocks)
@@ -85,7 +88,7 @@ impl Renderer {
         }
         self.aim = host.aim;
         self.find_last_visible_points()?;
-        for id in sums() {
+        for id in sums(self.config.layers) {
             let bytes = self.sizes.bytes(id).unwrap_or_default();
             self.device
                 .upload(id, &learned.elements::<u8>(&format!("{id:?}"), bytes as usize)?)?;

@@ -106,6 +106,13 @@ impl Stages<'_> {
                 .bind(vec![sums_of(iteration)]),
         );
         // After the photons, because an iteration that has to be repeated must stop before it adds anything.
+        let meets_anew = iteration == 0 || self.config.estimator == Estimator::Sppm;
+        if self.config.layers.show_surfaces() && meets_anew {
+            recording.dispatch(
+                self.ray_stage(&shaders::LAYERS, self.sizes.pixel_slots)
+                    .push(shaders::CameraTurnPush::from(turn)),
+            );
+        }
         for turn in turn.others() {
             self.camera(turn, recording);
             self.direct(turn, false, recording);
@@ -125,7 +132,11 @@ impl Stages<'_> {
             emitted: emitted as f32,
             camera_paths,
         };
-        recording.dispatch(StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots).push(push));
+        recording.dispatch(
+            StageDesc::new(&shaders::RESOLVE, self.sizes.pixel_slots)
+                .constant("LIGHT_PARTS", u32::from(self.config.layers.show_light()))
+                .push(push),
+        );
         recording
     }
 

@@ -35,6 +35,16 @@ pub struct Normalisation {
     pub scale: f64,
 }
 
+impl Default for Normalisation {
+    /// Render space is world space.
+    fn default() -> Self {
+        Self {
+            centre: DVec3::ZERO,
+            scale: 1.0,
+        }
+    }
+}
+
 impl Normalisation {
     /// The point of render space that is `world` in world space.
     pub fn to_render(self, world: DVec3) -> Vec3 {

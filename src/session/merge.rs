@@ -4,6 +4,7 @@
 //! makes no difference in any bit.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
 use serde::{Deserialize, Serialize};
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::state::{Identity, State};
 use super::{Rendered, rendered::Of};
 use crate::backend::{Counters, DeviceDescription, Resolved};
-use crate::config::{SEQUENCES, SequenceIterations, Totals};
+use crate::config::{Layers, SEQUENCES, SequenceIterations, Totals};
 use crate::error::{Error, Result};
 use crate::estimate::ErrorEstimate;
 use crate::film::Metadata;
@@ -258,6 +259,9 @@ impl Merge {
             },
             iterations,
             picture: picture.into(),
+            layers: Layers::NONE,
+            names: Arc::default(),
+            samples: totals.camera_paths,
             estimate,
             subject: Subject {
                 scene: first.scene.clone(),

@@ -1,5 +1,6 @@
 //! The public interface for rendering: a scene in, pictures out.
 
+mod layers;
 mod merge;
 mod prepared;
 mod rendered;
@@ -17,6 +18,7 @@ pub use state::State;
 pub use until::{Progress, Until};
 pub use warning::Warning;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::backend::{Backend, DeviceDescription, Phase};
@@ -29,6 +31,7 @@ use crate::gpu::Device;
 use crate::record::Run;
 use crate::scene::Camera;
 use crate::{cpu, pipeline};
+use layers::SceneNames;
 use rendered::About;
 use state::Identity;
 use work::Work;
@@ -97,6 +100,7 @@ pub struct Session {
     estimate: ErrorEstimate,
     warnings: Vec<Warning>,
     scene: String,
+    names: Arc<SceneNames>,
     identity: Identity,
     /// Power of the scene's lights.
     power: f64,
@@ -166,6 +170,7 @@ impl Session {
             estimate,
             warnings,
             scene: scene.name().to_owned(),
+            names: scene.names(),
             power: packed.power,
             scale: packed.scale,
             spent: Duration::ZERO,
@@ -199,6 +204,7 @@ impl Session {
     fn about(&self) -> About {
         About {
             scene: self.scene.clone(),
+            names: self.names.clone(),
             config: self.config.clone(),
             gather: self.gather(),
             device: self.device(),

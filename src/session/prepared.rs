@@ -1,7 +1,9 @@
 //! A scene that sessions can render.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use super::layers::SceneNames;
 use crate::config::RenderConfig;
 use crate::error::{Error, Result};
 use crate::gpu::DeviceSummary;
@@ -13,6 +15,7 @@ use crate::scene::Scene;
 #[derive(Debug, Clone)]
 pub struct PreparedScene {
     name: String,
+    names: Arc<SceneNames>,
     packed: PackedScene,
 }
 
@@ -25,6 +28,7 @@ impl PreparedScene {
         let path = scene.files.first().map_or(Path::new(&scene.name), |file| file);
         Ok(Self {
             name: scene.name.clone(),
+            names: Arc::new(SceneNames::from(scene)),
             packed: PackedScene::new(scene).map_err(|what| Error::scene(path, what))?,
         })
     }
@@ -32,6 +36,11 @@ impl PreparedScene {
     /// The scene's name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Names of its objects and materials.
+    pub(super) fn names(&self) -> Arc<SceneNames> {
+        self.names.clone()
     }
 
     /// Remarks for the user, in addition to [`Scene::notes`].
@@ -69,6 +78,7 @@ impl PreparedScene {
     pub fn with(&self, packed: PackedScene) -> Self {
         Self {
             name: self.name.clone(),
+            names: self.names.clone(),
             packed,
         }
     }

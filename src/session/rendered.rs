@@ -6,15 +6,16 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use super::Warning;
+use super::layers::{LayersOf, SceneNames};
 use super::state::Identity;
 use super::work::Done;
 use crate::backend::{DeviceDescription, Resolved};
-use crate::config::{RenderConfig, SequenceIterations};
+use crate::config::{Layers, RenderConfig, SequenceIterations};
 use crate::error::{Error, Result};
 #[cfg(test)]
 use crate::estimate::OnePhoton;
 use crate::estimate::{ErrorEstimate, RelativeError};
-use crate::film::{self, Image, Layers, Look, Metadata};
+use crate::film::{self, Additions, Image, Look, Metadata};
 use crate::report::{Profile, Subject};
 
 /// The failure that ended a render early.
@@ -45,6 +46,7 @@ impl fmt::Display for Failure {
 /// What is known of a render before it begins.
 pub(super) struct About {
     pub scene: String,
+    pub names: Arc<SceneNames>,
     pub config: RenderConfig,
     pub gather: &'static str,
     pub device: DeviceDescription,
@@ -61,6 +63,7 @@ impl About {
         let config = RenderConfig::default();
         Self {
             scene: String::new(),
+            names: Arc::default(),
             gather: "",
             device: DeviceDescription {
                 name: String::new(),
@@ -78,11 +81,15 @@ impl About {
 /// What a [`Rendered`] is made of.
 pub(super) struct Of {
     pub picture: Arc<Resolved>,
+    pub layers: Layers,
+    pub names: Arc<SceneNames>,
     /// Without the error.
     pub metadata: Metadata,
     pub iterations: SequenceIterations,
     pub estimate: ErrorEstimate,
     pub subject: Subject,
+    /// Camera paths of each pixel.
+    pub samples: u32,
     pub max_depth: u32,
     pub profile: Profile,
     pub failure: Option<Failure>,
@@ -126,6 +133,9 @@ impl Rendered {
             },
             iterations: done.iterations.into(),
             picture: done.picture,
+            layers: about.config.layers,
+            names: about.names.clone(),
+            samples: about.config.camera_paths() * done.iterations,
             estimate: about.estimate,
             subject,
             max_depth: about.config.max_depth,
@@ -199,21 +209,41 @@ impl Rendered {
         &self.of.profile
     }
 
-    /// Writes an OpenEXR file: linear RGB, alpha, the error of each pixel, and render metadata as attributes.
+    /// Writes an OpenEXR file: linear RGB, alpha, the error of each pixel, [layers](RenderConfig::layers), and render metadata as
+    /// attributes.
     ///
     /// # Errors
     /// A path that can't be written to, a full disk. The file is whole or absent.
     pub fn write_exr(&self, path: &Path) -> Result<()> {
+        self.write_view_layer(path, None)
+    }
+
+    /// As [`Rendered::write_exr`], with the names of channels by which Blender knows those of a view layer.
+    ///
+    /// # Errors
+    /// As [`Rendered::write_exr`].
+    pub fn write_view_layer(&self, path: &Path, view_layer: Option<&str>) -> Result<()> {
         let errors = self.pixel_errors();
-        let layers = Layers {
+        let layers = LayersOf {
+            layers: self.of.layers,
+            picture: &self.of.picture,
+            names: &self.of.names,
+            samples: self.of.samples,
+            view_layer,
+        };
+        let (channels, attributes) = layers.additions();
+        let additions = Additions {
             alpha: Some(&self.of.picture.alpha),
             errors: errors.as_ref(),
+            channels,
+            attributes,
+            view_layer,
         };
         let metadata = Metadata {
             estimated_error: self.error().map(|error| error.total),
             ..self.of.metadata.clone()
         };
-        film::write_exr(self.image(), layers, path, &metadata)
+        film::write_exr(self.image(), additions, path, &metadata)
     }
 
     /// Writes a tone-mapped PNG.

@@ -117,6 +117,7 @@ fn named(config: &RenderConfig) -> BTreeMap<String, String> {
         sampler,
         seed,
         filter,
+        layers,
         part: _, // part of the identity by itself
     } = config;
     let or_automatic = |value: Option<String>| value.unwrap_or_else(|| "automatic".to_owned());
@@ -144,6 +145,7 @@ fn named(config: &RenderConfig) -> BTreeMap<String, String> {
         ("sampler", sampler.to_string()),
         ("seed", seed.to_string()),
         ("filter", filter.to_string()),
+        ("layers", layers.to_string()),
     ];
     settings.map(|(name, value)| (name.to_owned(), value)).into()
 }

@@ -34,7 +34,7 @@ fn picture() -> Image {
 fn written(image: &Image, metadata: &Metadata) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("out.exr");
-    write_exr(image, Layers::default(), &path, metadata).expect("an EXR file");
+    write_exr(image, Additions::default(), &path, metadata).expect("an EXR file");
     (folder, path)
 }
 
@@ -66,9 +66,10 @@ fn an_exr_keeps_every_bit_of_every_pixel() {
 fn channels_are_named_so_that_others_read_one_picture() {
     let image = picture();
     let alpha: Vec<f32> = (0..image.pixels.len()).map(|i| i as f32 / 100.0).collect();
-    let layers = Layers {
+    let layers = Additions {
         alpha: Some(&alpha),
         errors: Some(&image),
+        ..Additions::default()
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("out.exr");
