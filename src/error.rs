@@ -129,6 +129,8 @@ pub enum Remedy {
     AnotherVulkanDevice,
     /// A device that is named by more of its name, or by its index.
     NameOneDevice,
+    /// Open Image Denoise 2, where the system looks for libraries or in a file that is named.
+    InstallDenoiser,
     /// Fewer photons or a smaller picture.
     SmallerRender,
     /// A picture of this resolution, another device, or the CPU.
@@ -146,6 +148,9 @@ impl fmt::Display for Remedy {
         let what = match self {
             Self::InstallLoader => "install one (Debian: libvulkan1 mesa-vulkan-drivers)",
             Self::InstallDriver => "install a Vulkan driver (Debian: mesa-vulkan-drivers)",
+            Self::InstallDenoiser => {
+                return text.write_str("install Open Image Denoise 2 (https://www.openimagedenoise.org)");
+            }
             Self::NameOneDevice => return text.write_str("give more of the name, or the index"),
             Self::AnotherVulkanDevice => return text.write_str("use another device"),
             Self::SmallerRender => return text.write_str("try fewer photons or a smaller picture"),

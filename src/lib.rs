@@ -52,6 +52,7 @@ mod alias;
 mod backend;
 mod config;
 mod cpu;
+mod denoise;
 mod emission;
 mod error;
 mod estimate;
@@ -84,6 +85,7 @@ pub use config::{
     Accel, Choice, Direct, EmissionChoice, Estimator, Layer, Layers, Part, PixelFilter, RenderConfig, Sampler,
     TriangleTest,
 };
+pub use denoise::{Denoiser, Guides};
 pub use error::{Error, Remedy, Result, Setting};
 pub use estimate::RelativeError;
 pub use film::{Exposure, Image, Look, Tone, read_exr};
