@@ -1,11 +1,13 @@
 //! Removes noise from pictures, by Open Image Denoise 2, which is loaded when it is asked for.
 
+mod blend;
 mod oidn;
 
 use std::path::Path;
 
 use crate::error::Result;
 use crate::film::Image;
+pub(crate) use blend::blend;
 
 /// Open Image Denoise, ready to use.
 pub struct Denoiser(oidn::Device);

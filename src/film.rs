@@ -77,4 +77,6 @@ pub struct Metadata {
     pub seconds: f64,
     /// Estimated relative error, where the run estimated it.
     pub estimated_error: Option<f64>,
+    /// What removed the noise, with its version.
+    pub denoised_by: Option<String>,
 }

@@ -872,6 +872,7 @@ fn values_of_an_environment_that_are_no_radiance_are_counted() {
         device: String::new(),
         seconds: 0.0,
         estimated_error: None,
+        denoised_by: None,
     };
     ppm_vk::internals::film::write_exr(
         &image,

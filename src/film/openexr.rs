@@ -42,6 +42,9 @@ fn custom_attributes(metadata: &Metadata) -> HashMap<Text, AttributeValue> {
     if let Some(error) = metadata.estimated_error {
         attributes.insert(Text::from("estimatedError"), AttributeValue::F64(error));
     }
+    if let Some(denoiser) = &metadata.denoised_by {
+        attributes.insert(Text::from("denoisedBy"), text(denoiser));
+    }
     attributes
 }
 
@@ -63,6 +66,8 @@ pub struct Additions<'a> {
     /// Channels `error_R`, `error_G`, `error_B`: the error of each pixel, as the render estimated it. Names have no dot: it would
     /// make several layers, whose pixels Blender does not read.
     pub errors: Option<&'a Image>,
+    /// Channels `noisy_R`, `noisy_G`, `noisy_B`: the picture before its noise was removed.
+    pub noisy: Option<&'a Image>,
     /// Further channels.
     pub channels: Vec<Channel>,
     /// Further attributes, texts by their names.
@@ -78,9 +83,11 @@ impl Additions<'_> {
             .map_or(component.to_owned(), |name| format!("{name}.Combined.{component}"))
     }
 
-    fn error(&self, component: &str) -> String {
-        self.view_layer
-            .map_or(format!("error_{component}"), |name| format!("{name}.Error.{component}"))
+    /// Name of a channel of a layer that every file may have, alone and in a view layer.
+    fn layer(&self, alone: &str, in_view_layer: &str, component: &str) -> String {
+        self.view_layer.map_or(format!("{alone}_{component}"), |name| {
+            format!("{name}.{in_view_layer}.{component}")
+        })
     }
 }
 
@@ -91,7 +98,7 @@ fn planes(image: &Image) -> impl Iterator<Item = Vec<f32>> {
 
 /// Writes a scanline OpenEXR file: 32-bit float R, G, B and what is added, ZIP compression over 16 lines (lossless), the
 /// chromaticities of Rec. 709, the program's version as `software`, and `metadata` as the attributes `iterations`,
-/// `photonsEmitted`, `seed` (decimal text), `device`, `seconds` and, if known, `estimatedError` (double).
+/// `photonsEmitted`, `seed` (decimal text), `device`, `seconds` and, if known, `estimatedError` (double) and `denoisedBy`.
 ///
 /// The same picture and metadata give the same bytes. NaN and infinity are written as they are.
 ///
@@ -121,9 +128,11 @@ pub fn write_exr(image: &Image, additions: Additions<'_>, path: &Path, metadata:
     for (component, samples) in ["R", "G", "B"].into_iter().zip(planes(image)) {
         add(&additions.combined(component), samples);
     }
-    if let Some(errors) = additions.errors {
-        for (component, samples) in ["R", "G", "B"].into_iter().zip(planes(errors)) {
-            add(&additions.error(component), samples);
+    let layers = [(additions.errors, "error", "Error"), (additions.noisy, "noisy", "Noisy Image")];
+    for (layer, alone, in_view_layer) in layers {
+        let planes = layer.into_iter().flat_map(planes);
+        for (component, samples) in ["R", "G", "B"].into_iter().zip(planes) {
+            add(&additions.layer(alone, in_view_layer, component), samples);
         }
     }
     if let Some(alpha) = additions.alpha {

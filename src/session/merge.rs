@@ -256,6 +256,7 @@ impl Merge {
                 device: device.name.clone(),
                 seconds: self.shares.values().map(|share| share.seconds).sum(),
                 estimated_error: None,
+                denoised_by: None,
             },
             iterations,
             picture: picture.into(),

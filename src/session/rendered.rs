@@ -11,6 +11,7 @@ use super::state::Identity;
 use super::work::Done;
 use crate::backend::{DeviceDescription, Resolved};
 use crate::config::{Layers, RenderConfig, SequenceIterations};
+use crate::denoise::{self, Denoiser};
 use crate::error::{Error, Result};
 #[cfg(test)]
 use crate::estimate::OnePhoton;
@@ -100,6 +101,12 @@ pub struct Rendered {
     of: Of,
     /// Estimated when it is first asked for: many snapshots need it on another thread than the render's, or never.
     error: OnceLock<Option<RelativeError>>,
+    denoised: Option<Denoised>,
+}
+
+struct Denoised {
+    image: Image,
+    by: String,
 }
 
 impl From<Of> for Rendered {
@@ -107,6 +114,7 @@ impl From<Of> for Rendered {
         Self {
             of,
             error: OnceLock::new(),
+            denoised: None,
         }
     }
 }
@@ -130,6 +138,7 @@ impl Rendered {
                 device: subject.device.name.clone(),
                 seconds: about.spent.as_secs_f64() + done.seconds,
                 estimated_error: None,
+                denoised_by: None,
             },
             iterations: done.iterations.into(),
             picture: done.picture,
@@ -144,9 +153,30 @@ impl Rendered {
         })
     }
 
-    /// The picture.
+    /// The picture: without its noise, if that has been [removed](Self::denoise).
     pub fn image(&self) -> &Image {
+        self.denoised.as_ref().map_or(self.noisy(), |denoised| &denoised.image)
+    }
+
+    /// The picture as it was rendered. Errors and warnings are of this one.
+    pub fn noisy(&self) -> &Image {
         &self.of.picture.image
+    }
+
+    /// Removes the picture's noise. Where its estimated error is smaller than what that changes, the picture is kept.
+    ///
+    /// # Errors
+    /// As [`Denoiser::denoise`]. The picture stays as it is.
+    pub fn denoise(&mut self, denoiser: &Denoiser) -> Result<()> {
+        // Guides: the picture has no layers of albedo and normals yet.
+        let denoised = denoiser.denoise(self.noisy(), None)?;
+        let image = match self.pixel_errors() {
+            Some(errors) => denoise::blend(self.noisy(), &denoised, &errors),
+            None => denoised,
+        };
+        let by = denoiser.name();
+        self.denoised = Some(Denoised { image, by });
+        Ok(())
     }
 
     /// Of each pixel, the share of its camera paths that met a surface.
@@ -188,7 +218,7 @@ impl Rendered {
             ..
         } = &self.of.subject;
         let mut warnings = Warning::of(counters, *photons_emitted, self.of.max_depth);
-        if self.image().pixels().iter().flatten().all(|&value| value == 0.0) {
+        if self.noisy().pixels().iter().flatten().all(|&value| value == 0.0) {
             warnings.push(Warning::Black);
         }
         warnings
@@ -209,8 +239,8 @@ impl Rendered {
         &self.of.profile
     }
 
-    /// Writes an OpenEXR file: linear RGB, alpha, the error of each pixel, [layers](RenderConfig::layers), and render metadata as
-    /// attributes.
+    /// Writes an OpenEXR file: linear RGB, alpha, the error of each pixel, the noisy picture if the noise was removed,
+    /// [layers](RenderConfig::layers), and render metadata as attributes.
     ///
     /// # Errors
     /// A path that can't be written to, a full disk. The file is whole or absent.
@@ -235,12 +265,14 @@ impl Rendered {
         let additions = Additions {
             alpha: Some(&self.of.picture.alpha),
             errors: errors.as_ref(),
+            noisy: self.denoised.as_ref().map(|_| self.noisy()),
             channels,
             attributes,
             view_layer,
         };
         let metadata = Metadata {
             estimated_error: self.error().map(|error| error.total),
+            denoised_by: self.denoised.as_ref().map(|denoised| denoised.by.clone()),
             ..self.of.metadata.clone()
         };
         film::write_exr(self.image(), additions, path, &metadata)

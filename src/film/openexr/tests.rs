@@ -19,6 +19,7 @@ fn metadata() -> Metadata {
         device: "llvmpipe (LLVM 15, 256 bits) – µ".to_owned(),
         seconds: 12.3456789012345,
         estimated_error: None,
+        denoised_by: None,
     }
 }
 
@@ -69,6 +70,7 @@ fn channels_are_named_so_that_others_read_one_picture() {
     let layers = Additions {
         alpha: Some(&alpha),
         errors: Some(&image),
+        noisy: Some(&image),
         ..Additions::default()
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -77,7 +79,12 @@ fn channels_are_named_so_that_others_read_one_picture() {
     let file = exr::prelude::read_first_flat_layer_from_file(&path).expect("a picture");
     let channels = &file.layer_data.channel_data.list;
     let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
-    assert_eq!(names, ["A", "B", "G", "R", "error_B", "error_G", "error_R"]);
+    assert_eq!(
+        names,
+        [
+            "A", "B", "G", "R", "error_B", "error_G", "error_R", "noisy_B", "noisy_G", "noisy_R"
+        ]
+    );
     assert_eq!(channels[0].sample_data, FlatSamples::F32(alpha));
     assert_eq!(read_exr(&path).expect("a picture"), image);
 }
@@ -115,6 +122,18 @@ fn the_estimated_error_is_written_only_where_it_is_known() {
         ..metadata()
     };
     assert_eq!(error(&known), Some(AttributeValue::F64(0.01)));
+}
+
+#[test]
+fn what_removed_the_noise_is_written() {
+    let denoised = Metadata {
+        denoised_by: Some("Open Image Denoise 2.0.0".to_owned()),
+        ..metadata()
+    };
+    let (_folder, path) = written(&picture(), &denoised);
+    let by = attributes(&path).other.remove(&Text::from("denoisedBy"));
+    let expected = Text::new_or_panic("Open Image Denoise 2.0.0");
+    assert_eq!(by, Some(AttributeValue::Text(expected)));
 }
 
 #[test]
