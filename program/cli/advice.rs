@@ -30,6 +30,11 @@ fn of_remedy(remedy: Remedy) -> String {
     match remedy {
         Remedy::InstallLoader => "install one (Debian: libvulkan1 mesa-vulkan-drivers) or use --backend cpu".to_owned(),
         Remedy::InstallDriver => "install a driver (Debian: mesa-vulkan-drivers) or use --backend cpu".to_owned(),
+        Remedy::InstallDenoiser => format!(
+            "install Open Image Denoise 2 (https://www.openimagedenoise.org, or pip install pyoidn), name the file of its library \
+             by {}, or leave out --denoise",
+            super::denoise::LIBRARY
+        ),
         Remedy::AnotherDevice => {
             "pick another with --device (ppm-vk devices lists them) or use --backend cpu".to_owned()
         }
@@ -91,6 +96,7 @@ mod tests {
         for (remedy, flags) in [
             (Remedy::InstallLoader, &["--backend cpu"][..]),
             (Remedy::InstallDriver, &["--backend cpu"]),
+            (Remedy::InstallDenoiser, &["PPM_VK_OIDN", "--denoise"]),
             (Remedy::AnotherDevice, &["--device", "--backend cpu"]),
             (Remedy::AnotherVulkanDevice, &["--device"]),
             (Remedy::SmallerRender, &["--photons", "--resolution"]),

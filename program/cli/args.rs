@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::bench::{BenchFeatures, BenchGather, BenchKernels, BenchRandom};
 use super::compare::Compare;
 use super::converge::ConvergeArguments;
+use super::denoise::DenoiseArguments;
 use super::events::ProgressFormat;
 use super::manual::Manual;
 use super::merge::MergeArguments;
@@ -130,6 +131,8 @@ pub struct RenderArguments {
     pub png: Option<PathBuf>,
     #[command(flatten)]
     pub look: LookArguments,
+    #[command(flatten)]
+    pub denoise: DenoiseArguments,
     /// Radius of the camera's lens, in scene units, for depth of field [default: a pinhole].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     pub aperture: Option<f64>,

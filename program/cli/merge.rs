@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::Outcome;
 use super::args::{LookArguments, exr_file, png_file, view_layer};
+use super::denoise::{DenoiseArguments, denoise};
 use super::outputs::{PictureFiles, all, check_outputs, named};
 use ppm_vk::internals::files::Writing;
 use ppm_vk::{Merge, Rendered, State};
@@ -28,6 +29,8 @@ pub struct MergeArguments {
     pub layer_name: Option<String>,
     #[command(flatten)]
     pub look: LookArguments,
+    #[command(flatten)]
+    pub denoise: DenoiseArguments,
     /// Write the sum, which can be merged with other parts.
     #[arg(long, value_name = "FILE", value_parser = named("state"))]
     pub state: Option<PathBuf>,
@@ -42,6 +45,7 @@ pub fn run(arguments: &MergeArguments) -> Result<Outcome> {
         arguments.state.as_ref(),
     ];
     check_outputs(&inputs, outputs.into_iter().flatten().map(PathBuf::as_path))?;
+    let denoiser = arguments.denoise.open()?;
     let mut merge: Option<Merge> = None;
     for path in &arguments.parts {
         let state = State::read(path)?;
@@ -52,7 +56,8 @@ pub fn run(arguments: &MergeArguments) -> Result<Outcome> {
         added.with_context(|| path.display().to_string())?;
     }
     let merge = merge.context("no part is given")?;
-    let rendered = merge.rendered();
+    let mut rendered = merge.rendered();
+    let denoised = denoise(&mut rendered, denoiser.as_ref());
     say_merged(&merge, &rendered, &arguments.output);
     let _writing = Writing::begin();
     let files = PictureFiles {
@@ -63,7 +68,11 @@ pub fn run(arguments: &MergeArguments) -> Result<Outcome> {
     };
     let state = arguments.state.as_ref();
     let state = state.map(|file| Ok(merge.state()?.write(file)?));
-    all(files.write(&rendered, |_| ()).into_iter().chain(state))?;
+    all(files
+        .write(&rendered, |_| ())
+        .into_iter()
+        .chain(state)
+        .chain([denoised]))?;
     Ok(Outcome::Done)
 }
 

@@ -17,6 +17,7 @@ use ppm_vk::{
 };
 
 use super::args::{Arguments, BackendChoice, RenderArguments};
+use super::denoise::denoise;
 use super::events::{Event, Events, Phase};
 use super::outputs::{all, check_outputs};
 use super::progress::{BUILDING, Meter, while_showing, with_prefix};
@@ -69,6 +70,7 @@ impl Job<'_> {
         let events = &watch.events;
         // Before any work: fail early if a picture can't be written.
         check_outputs(&arguments.read.inputs(path), outputs(arguments, output))?;
+        let denoiser = arguments.denoise.open()?;
         interrupt::install()?;
 
         let quiet = arguments.quiet || arguments.has_events_on_stdout();
@@ -130,7 +132,11 @@ impl Job<'_> {
             rendered = session.render_with(until, &hooks);
         }
         events.begin(Phase::Write);
-        let rendered = rendered.map(Arc::new);
+        let mut denoised = Ok(());
+        let rendered = rendered.map(|mut rendered| {
+            denoised = denoise(&mut rendered, denoiser.as_ref());
+            Arc::new(rendered)
+        });
         takers.end(rendered.as_ref().ok());
         let rendered = rendered?;
         tell_warnings(events, &rendered.warnings());
@@ -140,7 +146,7 @@ impl Job<'_> {
             events.written(file, session.iterations());
             Ok(())
         });
-        all([write_outputs(arguments, events, output, &rendered)]
+        all([write_outputs(arguments, events, output, &rendered), denoised]
             .into_iter()
             .chain(state))?;
         Ok(if interrupt::requested() {
