@@ -9,8 +9,7 @@ import traceback
 import bpy
 import numpy as np
 
-from . import exr, program
-from .export import export_scene
+from . import export, exr, program
 from .film import Film
 from .program import ProgramError
 
@@ -60,8 +59,12 @@ class PpmVkRenderEngine(bpy.types.RenderEngine):
         path = program.find()
         scene = depsgraph.scene
         self.update_stats("", "Exporting the scene")
-        exported = self._on_main_thread(lambda: export_scene(depsgraph, folder))
-        for text in exported.warnings:
+        warnings = self._on_main_thread(lambda: export.collect(depsgraph, folder))
+        of_exporter = export.run_exporter(folder, self.test_break)
+        if of_exporter is None:
+            raise Cancelled
+        exported = self._on_main_thread(lambda: export.complete(depsgraph, folder))
+        for text in dict.fromkeys(warnings + of_exporter + exported.warnings):
             self.report({"WARNING"}, text)
         film = Film(scene, exported.camera, exported.background, program.has_flag(path, "--crop"))
         output = os.path.join(folder, "picture.exr")
@@ -74,7 +77,7 @@ class PpmVkRenderEngine(bpy.types.RenderEngine):
             run.kill()
 
     def _on_main_thread(self, work):
-        """Runs what makes data-blocks where Blender allows it: with a window a render has a thread of its own."""
+        """Runs what reads the user's data-blocks while the user can't change them: with a window a render has a thread of its own."""
         if bpy.app.background or threading.current_thread() is threading.main_thread():
             return work()
         outcome = []

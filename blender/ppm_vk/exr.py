@@ -1,5 +1,5 @@
-"""Reads the EXR files that the program writes: scan lines, 32-bit floats or half floats, one part. Blender reads them only into
-images of the file, which a render must not touch."""
+"""Reads the EXR files that the program writes (scan lines, 32-bit floats or half floats, one part), and writes such files. Blender
+itself does so only by images of the file that is being rendered, whose data-blocks must stay as they are."""
 
 import struct
 import zlib
@@ -96,3 +96,32 @@ def read(path):
                 planes[name][line] = np.frombuffer(block, kind, width, begin)
                 begin += width * kind.itemsize
     return Picture(planes, width, height, left, top)
+
+
+def write(path, pixels):
+    """Writes lines from the top of RGB, 32-bit floats, without compression."""
+    height, width, _ = pixels.shape
+    planes = np.ascontiguousarray(pixels[..., ::-1].transpose(0, 2, 1), "<f4")  # B, G, R of each line
+    channel = struct.pack("<iB3xii", 2, 0, 1, 1)
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    attributes = (
+        ("channels", "chlist", b"".join(name + b"\0" + channel for name in (b"B", b"G", b"R")) + b"\0"),
+        ("compression", "compression", b"\0"),
+        ("dataWindow", "box2i", window),
+        ("displayWindow", "box2i", window),
+        ("lineOrder", "lineOrder", b"\0"),
+        ("pixelAspectRatio", "float", struct.pack("<f", 1)),
+        ("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0)),
+        ("screenWindowWidth", "float", struct.pack("<f", 1)),
+    )
+    header = struct.pack("<II", 20000630, 2)
+    for name, kind, value in attributes:
+        header += name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+    header += b"\0"
+    size = planes[0].nbytes
+    first = len(header) + 8 * height
+    with open(path, "wb") as file:
+        file.write(header)
+        file.write(struct.pack(f"<{height}Q", *(first + y * (8 + size) for y in range(height))))
+        for y, line in enumerate(planes):
+            file.write(struct.pack("<ii", y, size) + line.tobytes())

@@ -41,11 +41,12 @@ def has_flag(path, flag):
     """Whether the program lists a flag in its help."""
     key = (path, os.path.getmtime(path))
     if key not in _help:
-        _help[key] = _start([path, "--help"]).communicate()[0]
+        _help[key] = start([path, "--help"]).communicate()[0]
     return f"{flag} " in _help[key] or f"{flag}\n" in _help[key]
 
 
-def _start(command, folder=None):
+def start(command, folder=None):
+    """Starts a program whose output is read."""
     hidden = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
         return subprocess.Popen(
@@ -66,7 +67,7 @@ class Run:
     """A run of the program, and its events."""
 
     def __init__(self, path, arguments, folder):
-        self._process = _start([path, *arguments, "--progress=json"], folder)
+        self._process = start([path, *arguments, "--progress=json"], folder)
         self._events = queue.Queue()
         self._last_lines = collections.deque(maxlen=20)
         self._readers = [threading.Thread(target=reader, daemon=True) for reader in (self._read_events, self._read_lines)]
@@ -107,6 +108,8 @@ class Run:
             code = self._process.wait()
         for reader in self._readers:
             reader.join(_GRACE)
+        self._process.stdout.close()
+        self._process.stderr.close()
         return code
 
     def last_line(self):

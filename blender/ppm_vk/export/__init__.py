@@ -1,13 +1,16 @@
-"""Exports an evaluated scene: by Blender's own glTF exporter, and in addition what that one drops."""
+"""Exports what a render shows of a scene: by Blender's own glTF exporter, and in addition what that one drops."""
 
+import json
 import os
+import subprocess
+import sys
 from dataclasses import dataclass
 
 import bpy
 
-from ..program import ProgramError
+from ..program import ProgramError, start
 from . import camera, lights, world
-from .flatten import Flattened
+from .collect import Collected
 from .gltf import Document
 
 
@@ -20,18 +23,49 @@ class Exported:
     warnings: list
 
 
-def export_scene(depsgraph, folder):
-    """Writes the scene of a depsgraph, as it is at its frame, into a folder."""
+def collect(depsgraph, folder):
+    """Writes for `run_exporter` what a render shows at the frame of a depsgraph."""
+    warnings = []
+    collected = Collected(depsgraph, warnings)
+    if collected.is_empty():
+        raise ProgramError("There is nothing to render: the scene has no mesh that renders show")
+    collected.write(folder)
+    return warnings
+
+
+def run_exporter(folder, is_cancelled):
+    """Exports what `collect` has written, by another Blender. Returns warnings."""
+    script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "child.py")
+    if bpy.app.binary_path:
+        command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-exit-code", "1", "--python", script, "--", folder]
+    else:
+        # Blender as a module.
+        command = [sys.executable, script, folder]
+    process = start(command)
+    lines = ""
+    while True:
+        try:
+            lines = "\n".join(process.communicate(timeout=0.1))
+            break
+        except subprocess.TimeoutExpired:
+            if is_cancelled():
+                process.kill()
+                process.communicate()
+                return None
+    if process.returncode != 0:
+        print(lines)
+        said = [line for line in lines.splitlines() if line.strip()]
+        raise ProgramError(f"Blender's glTF exporter failed: {said[-1] if said else 'it does not say why'}")
+    with open(os.path.join(folder, "warnings.json"), encoding="utf-8") as file:
+        return json.load(file)
+
+
+def complete(depsgraph, folder):
+    """Adds to what the exporter wrote what it drops."""
     warnings = []
     of_camera = camera.Camera(depsgraph, warnings)
     path = os.path.join(folder, "scene.gltf")
-    with Flattened(depsgraph, warnings) as flattened:
-        if flattened.is_empty:
-            raise ProgramError("There is nothing to render: the scene has no mesh that renders show")
-        _run_exporter(flattened.scene, path)
-        document = Document(path)
-        flattened.restore_names(document)
-        flattened.materials.complete(document)
+    document = Document(path)
     lights.add(document, depsgraph, warnings)
     of_camera.add_to(document)
     document.write()
@@ -40,33 +74,4 @@ def export_scene(depsgraph, folder):
     arguments += background.arguments(folder, is_dark=document.is_dark())
     if depsgraph.scene.render.use_motion_blur:
         warnings.append("Motion blur is left out")
-    return Exported(path, arguments, of_camera, background, list(dict.fromkeys(warnings)))
-
-
-def _run_exporter(scene, path):
-    operator = bpy.ops.export_scene.gltf
-    options = {
-        "export_format": "GLTF_SEPARATE",
-        "use_active_scene": True,
-        "export_extras": True,
-        "export_animations": False,
-        "export_skins": False,
-        "export_morph": False,
-        "export_cameras": False,
-        "export_lights": False,
-        "export_current_frame": True,
-        "export_rest_position_armature": False,
-        "export_apply": True,
-        "export_import_convert_lighting_mode": "COMPAT",
-    }
-    try:
-        known = set(operator.get_rna_type().properties.keys())
-    except (AttributeError, KeyError):
-        raise ProgramError("Blender's glTF exporter is off: enable the add-on «glTF 2.0 format» in the preferences") from None
-    options = {name: value for name, value in options.items() if name in known}
-    try:
-        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-            operator(filepath=path, **options)
-    except RuntimeError as error:
-        reason = [line for line in str(error).splitlines() if line.strip() and not line.startswith("Location:")]
-        raise ProgramError(f"Blender's glTF exporter failed: {reason[-1] if reason else 'it does not say why'}") from error
+    return Exported(path, arguments, of_camera, background, warnings)

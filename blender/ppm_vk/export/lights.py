@@ -5,6 +5,8 @@ import math
 
 import numpy as np
 
+from .materials import uses_nodes
+
 PUNCTUAL = "KHR_lights_punctual"
 # The program's own: radius of a point or spot, angle of a sun, smooth edge of a spot.
 SHAPE = "PPMVK_light_shape"
@@ -84,7 +86,7 @@ def _strength(lamp, name, matrix, warnings):
 
 
 def _emission_node(lamp):
-    if not lamp.use_nodes or not lamp.node_tree:
+    if not uses_nodes(lamp):
         return None
     output = lamp.node_tree.get_output_node("CYCLES")
     links = output.inputs["Surface"].links if output else ()

@@ -25,7 +25,6 @@ class Materials:
         self._warnings = warnings
         self._copies = {}
         self._entries = []
-        self.made = []
 
     def copy_of(self, material):
         """The copy of a material, or of Blender's default material for None."""
@@ -41,14 +40,13 @@ class Materials:
         else:
             copy = material.evaluated_get(self._depsgraph).copy()
             name = material.name
-        self.made.append(copy)
         entry = {"name": name, "absorption": None, "closed": True}
         copy[MARK] = len(self._entries)
         self._entries.append(entry)
-        # In Blender 6 every material has nodes.
-        if not copy.use_nodes or not copy.node_tree:
+        if not uses_nodes(copy):
             color, metallic, roughness = tuple(copy.diffuse_color), copy.metallic, copy.roughness
             copy.use_nodes = True
+            copy.node_tree.nodes.clear()
             node = _Tree(copy.node_tree).new_principled()
             node.inputs["Base Color"].default_value = color
             node.inputs["Metallic"].default_value = metallic
@@ -275,6 +273,11 @@ class _Tree:
                 found.append(node)
                 left += [link.from_node for socket in node.inputs for link in socket.links]
         return found
+
+
+def uses_nodes(block):
+    """Whether a material, world or lamp has nodes; from Blender 5 on they have."""
+    return bool(block.node_tree) and (bpy.app.version >= (5, 0, 0) or block.use_nodes)
 
 
 def node_at(socket):

@@ -2,10 +2,10 @@
 
 import os
 
-import bpy
 import numpy as np
 
-from .materials import node_at
+from .. import exr
+from .materials import node_at, uses_nodes
 
 # The program's environment at a rotation of 0 is turned by this against Blender's.
 _QUARTER = 90
@@ -15,7 +15,6 @@ class Background:
     def __init__(self, depsgraph, warnings):
         self._warnings = warnings
         self._color = np.zeros(3)
-        self._image = None
         self._pixels = None
         self._rotation = 0.0
         self._strength = 1.0
@@ -24,7 +23,7 @@ class Background:
             self._read(world.evaluated_get(depsgraph))
 
     def _read(self, world):
-        if not (world.use_nodes and world.node_tree):
+        if not uses_nodes(world):
             self._color = np.array(world.color)
             return
         output = world.node_tree.get_output_node("CYCLES")
@@ -74,7 +73,6 @@ class Background:
         if not image.is_float and image.colorspace_settings.name == "sRGB":
             pixels = np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
         self._pixels = pixels
-        self._image = image
 
     def arguments(self, folder, is_dark):
         if self._pixels is None:
@@ -84,22 +82,9 @@ class Background:
                 return ["--environment=0,0,0"] if is_dark else []
             return ["--environment=" + ",".join(f"{part:.9g}" for part in radiance)]
         path = os.path.join(folder, "world.exr")
-        self._write(path)
+        exr.write(path, self._pixels[::-1])
         rotation = _QUARTER - np.degrees(self._rotation)
         return [f"--environment={path}", f"--environment-strength={self._strength:.9g}", f"--environment-rotation={rotation:.9g}"]
-
-    def _write(self, path):
-        height, width, _ = self._pixels.shape
-        image = bpy.data.images.new("ppm-vk world", width, height, alpha=False, float_buffer=True)
-        try:
-            image.colorspace_settings.is_data = True
-            pixels = np.concatenate([self._pixels, np.ones((height, width, 1), np.float32)], axis=2)
-            image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
-            image.file_format = "OPEN_EXR"
-            image.filepath_raw = path
-            image.save()
-        finally:
-            bpy.data.images.remove(image)
 
     def radiance(self, directions):
         """In directions of Blender's axes."""
