@@ -37,15 +37,31 @@ vec3 direction_off(vec3 axis, float versine, float turn) {
     return normalize(basis(axis) * vec3(across * unit_vector_at(turn), 1.0 - versine));
 }
 
+// A step of Newton's method towards the place t within a spot's ramp up to which the falloff t²·(1 + smooth·(2 − 2t)) has an
+// integral; `third` is (1 + 2·smooth) / 3.
+float nearer_place(float t, float integral, float smoothness, float third) {
+    float error = t * t * t * (third - 0.5 * smoothness * t) - integral;
+    return t - error / max(t * t * (3.0 * third - 2.0 * smoothness * t), 1e-30);
+}
+
 // 1 − cos of a photon's angle from a spot's axis, sampled so that all photons have the same flux, and the solid angle that gives
-// the same flux at full intensity: the integral of the squared ramp is a third of its width.
+// the same flux at full intensity: the integral of a squared ramp is a third of its width, that of a smoothstep a half.
 float spot_versine(Light light, float u, out float solid_angle) {
     float ramp = light.outer - light.inner;
-    float whole = light.inner + ramp / 3.0;
+    float smoothness = SOFT_LIGHTS ? light.area : 0.0;
+    float third = (1.0 + 2.0 * smoothness) / 3.0;
+    float of_ramp = ramp * (third - 0.5 * smoothness);
+    float whole = light.inner + of_ramp;
     solid_angle = 2.0 * PI * whole;
     float from_outside = u * whole;
-    return from_outside < ramp / 3.0 ? light.outer - pow(3.0 * from_outside * ramp * ramp, 1.0 / 3.0)
-                                     : whole - from_outside;
+    float integral = from_outside / ramp;
+    float t = pow(integral / third, 1.0 / 3.0);
+    if (SOFT_LIGHTS) {
+        t = nearer_place(t, integral, smoothness, third);
+        t = nearer_place(t, integral, smoothness, third);
+        t = nearer_place(t, integral, smoothness, third);
+    }
+    return from_outside < of_ramp ? light.outer - ramp * t : whole - from_outside;
 }
 
 // Distant light of many directions: from a disc across the ray that covers the target, or the scene.

@@ -7,7 +7,7 @@
 #include "trace/media.glsl"
 
 layout(constant_id = 14) const bool PUNCTUAL_LIGHTS = false;
-layout(constant_id = 30) const bool SOFT_LIGHTS = false; // some punctual lights have an extent
+layout(constant_id = 30) const bool SOFT_LIGHTS = false; // some punctual lights have an extent or a smooth falloff
 layout(constant_id = 15) const bool ENVIRONMENT = false;
 layout(constant_id = 31) const bool PARTED_LIGHTS = false; // triangles whose parts are lights
 
@@ -118,10 +118,14 @@ vec3 emitted_radiance(Material material, float cosine) {
 }
 
 // The share of a spot's intensity at 1 − cos of the angle from its axis: the square of a ramp in the cosine, as
-// KHR_lights_punctual recommends.
+// KHR_lights_punctual recommends, or its smoothstep.
 float spot_falloff(Light light, float versine) {
     float ramp = clamp((light.outer - versine) / (light.outer - light.inner), 0.0, 1.0);
-    return ramp * ramp;
+    float falloff = ramp * ramp;
+    if (SOFT_LIGHTS) {
+        falloff *= 1.0 + light.area * (2.0 - 2.0 * ramp);
+    }
+    return falloff;
 }
 
 // The attenuation of a light with a range at a distance: KHR_lights_punctual's window over the inverse square.

@@ -126,13 +126,20 @@ fn direction_around(axis: DVec3, versine: f64, turn: f64) -> DVec3 {
 /// Samples 1 − cos of the angle to a spot's axis so that all photons have the same flux. Also returns the solid angle of an
 /// equivalent spot with full intensity.
 fn spot_versine(light: &Light, u: f64) -> (f64, f64) {
-    let (inner, outer) = (f64::from(light.inner), f64::from(light.outer));
-    // The integral of the squared ramp is a third of its width.
+    let (inner, outer, smooth) = (f64::from(light.inner), f64::from(light.outer), f64::from(light.area));
     let ramp = outer - inner;
-    let whole = inner + ramp / 3.0;
+    let whole = light.full_versine();
     let from_outside = u * whole;
-    let versine = if from_outside < ramp / 3.0 {
-        outer - (3.0 * from_outside * ramp * ramp).cbrt()
+    let versine = if from_outside < whole - inner {
+        // The place t within the ramp up to which the falloff t²·(1 + smooth·(2 − 2t)) has this integral, by Newton's method.
+        let integral = from_outside / ramp;
+        let third = (1.0 + 2.0 * smooth) / 3.0;
+        let mut t = (integral / third).cbrt();
+        for _ in 0..4 {
+            let error = t * t * t * (third - 0.5 * smooth * t) - integral;
+            t -= error / (t * t * (3.0 * third - 2.0 * smooth * t)).max(1e-30);
+        }
+        outer - ramp * t
     } else {
         whole - from_outside
     };
@@ -217,23 +224,29 @@ mod tests {
     /// The fraction of a spot's photons within an angle equals the fraction of its integrated intensity.
     #[test]
     fn photons_of_a_spot_are_spread_as_its_intensity() {
-        let light = Light {
-            kind: SPOT_LIGHT,
-            direction: [0.0, 0.0, 1.0],
-            inner: 0.1,
-            outer: 0.4,
-            ..Light::zeroed()
-        };
+        for smooth in [0.0, 1.0] {
+            assert_spread(&Light {
+                kind: SPOT_LIGHT,
+                direction: [0.0, 0.0, 1.0],
+                inner: 0.1,
+                outer: 0.4,
+                area: smooth,
+                ..Light::zeroed()
+            });
+        }
+    }
+
+    fn assert_spread(light: &Light) {
         const STEPS: u32 = 100_000;
         let mut integral = 0.0;
         let step = 0.4 / f64::from(STEPS);
-        let falloff = |versine: f64| spot_falloff(&light, direction_around(DVec3::Z, versine, 0.3));
-        let (_, solid_angle) = spot_versine(&light, 0.0);
+        let falloff = |versine: f64| spot_falloff(light, direction_around(DVec3::Z, versine, 0.3));
+        let (_, solid_angle) = spot_versine(light, 0.0);
         for i in 0..STEPS {
             integral += falloff((f64::from(i) + 0.5) * step) * step;
             if i % 10_000 == 9_999 {
                 let within = 2.0 * PI * integral / solid_angle;
-                let (found, _) = spot_versine(&light, (1.0 - within).max(0.0));
+                let (found, _) = spot_versine(light, (1.0 - within).max(0.0));
                 let expected = f64::from(i + 1) * step;
                 assert!(
                     falloff(expected) < 1e-6 || (found - expected).abs() < 1e-4,

@@ -29,14 +29,15 @@ pub(super) fn emitted_radiance(material: &Material, cosine: f64) -> DVec3 {
     coat_passes(f64::from(material.coat), cosine) * rgb(material.emission)
 }
 
-/// Falloff of a spot's intensity: the square of a ramp in the cosine, as `KHR_lights_punctual` recommends.
+/// Falloff of a spot's intensity: the square of a ramp in the cosine, as `KHR_lights_punctual` recommends, or its smoothstep.
 pub(super) fn spot_falloff(light: &Light, direction: DVec3) -> f64 {
     if light.kind != SPOT_LIGHT {
         return 1.0;
     }
     let versine = 0.5 * (direction - rgb(light.direction)).length_squared();
     let (inner, outer) = (f64::from(light.inner), f64::from(light.outer));
-    ((outer - versine) / (outer - inner)).clamp(0.0, 1.0).powi(2)
+    let ramp = ((outer - versine) / (outer - inner)).clamp(0.0, 1.0);
+    ramp.powi(2) * (1.0 + f64::from(light.area) * (2.0 - 2.0 * ramp))
 }
 
 /// Attenuation by a light's range: `KHR_lights_punctual`'s window over the inverse square.

@@ -146,10 +146,7 @@ fn share(scene: &PackedScene, source: &Range<u32>, sphere: &Sphere) -> f64 {
     let shares = probes.map(|light| match light.kind {
         DIRECTIONAL_LIGHT | ENVIRONMENT_LIGHT => PI * sphere.radius.powi(2) / f64::from(light.area),
         POINT_LIGHT => versine(light, points_of(scene, light)[0]) / 2.0,
-        SPOT_LIGHT => {
-            let (inner, outer) = (f64::from(light.inner), f64::from(light.outer));
-            versine(light, points_of(scene, light)[0]) / (inner + (outer - inner) / 3.0)
-        }
+        SPOT_LIGHT => versine(light, points_of(scene, light)[0]) / light.full_versine(),
         _ => 2.0 * sphere.versine(points_of(scene, light).into_iter().sum::<DVec3>() / 3.0),
     });
     shares.map(|share| share.min(1.0)).sum::<f64>() / count

@@ -168,7 +168,8 @@ device_structs! {
         pub triangle: u32,
         /// Its probability, nearly in proportion to its flux.
         pub probability: f32,
-        /// Area of the triangle or its part, or of the disc from which a distant light's photons start.
+        /// Area of the triangle or its part, or of the disc from which a distant light's photons start. Spot: 1 where the
+        /// falloff is a smoothstep, 0 where it is the square of a ramp.
         pub area: f32,
         /// [`TRIANGLE_LIGHT`], [`POINT_LIGHT`], [`SPOT_LIGHT`], [`DIRECTIONAL_LIGHT`] or [`ENVIRONMENT_LIGHT`].
         pub kind: u32,

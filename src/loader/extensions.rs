@@ -2,6 +2,8 @@
 
 use super::material::layers;
 
+/// The program's own, for light sources that `KHR_lights_punctual` can't describe.
+pub(crate) const LIGHT_SHAPE: &str = "PPMVK_light_shape";
 pub(crate) const BASISU: &str = "KHR_texture_basisu";
 pub(crate) const DRACO: &str = "KHR_draco_mesh_compression";
 pub(crate) const MESHOPT: &str = "EXT_meshopt_compression";
@@ -26,6 +28,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_texture_transform",
+    LIGHT_SHAPE,
     QUANTIZATION,
     DRACO,
     MESH_INSTANCING,

@@ -1,14 +1,16 @@
 //! `KHR_lights_punctual`: point, spot and directional lights.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec3, Vec3};
 use gltf_json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Type};
 use gltf_json::validation::Checked;
 use gltf_json::{Index, Root};
+use serde::Deserialize;
 
 use super::LoadOptions;
 use super::diagnostic::{Check, Warnings, damaged, label};
+use super::extensions::LIGHT_SHAPE;
 use super::graph::{PlacedNode, node_label};
 use crate::scene::{LightKind, Normalisation, PunctualLight};
 
@@ -18,6 +20,44 @@ const NARROWEST_EDGE: f64 = 1e-4;
 /// Range of a light's radius, in render units: below it is treated as 0, above it is refused.
 const SMALLEST_RADIUS: f64 = 1e-9;
 const LARGEST_RADIUS: f64 = 1e4;
+
+/// `PPMVK_light_shape`: what a light has beyond `KHR_lights_punctual`.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(default)]
+struct Shape {
+    /// Point, spot: in scene units.
+    radius: Option<f64>,
+    /// Directional: angular diameter, in radians.
+    angle: Option<f64>,
+    /// Spot: the falloff is a smoothstep of the cosine, as in Blender, not the square of a ramp.
+    smooth: bool,
+}
+
+impl Shape {
+    fn of(light: &JsonLight) -> Check<Self> {
+        #[derive(Default, Deserialize)]
+        #[serde(default)]
+        struct Extensions {
+            #[serde(rename = "PPMVK_light_shape")]
+            shape: Shape,
+        }
+        let Some(extensions) = &light.extensions else {
+            return Ok(Self::default());
+        };
+        let Extensions { shape } = serde_json::from_str(extensions.get())
+            .map_err(|error| damaged(format_args!("its extensions can't be read: {error}")))?;
+        let lengths = [shape.radius, shape.angle].into_iter().flatten();
+        if !lengths.clone().all(|length| length >= 0.0) || shape.angle.is_some_and(|angle| angle > PI) {
+            return Err(format!(
+                "its radius is {:?} and its angle {:?} ({LIGHT_SHAPE}), but neither may be negative, nor the angle above π; correct \
+                 them in the file",
+                shape.radius.unwrap_or_default(),
+                shape.angle.unwrap_or_default()
+            ));
+        }
+        Ok(shape)
+    }
+}
 
 /// The lights of the nodes, in render space; black ones are left out.
 pub(crate) fn punctual_lights(
@@ -47,15 +87,16 @@ pub(crate) fn punctual_lights(
             ))
         })?;
         let label = label("light", index, light.name.as_deref());
-        let Some(kind) = kind_of(light, placed).map_err(|what| format!("{label}: {what}"))? else {
+        let shape = Shape::of(light).map_err(|what| format!("{label}: {what}"))?;
+        let Some(kind) = kind_of(light, shape, placed).map_err(|what| format!("{label}: {what}"))? else {
             warnings.push(format!(
                 "{label}: {} leaves it no direction (a scale of zero), and it is skipped",
                 node_label(root, placed.index)
             ));
             continue;
         };
-        let light_in_place =
-            place(light, kind, placed, normalisation, options, root).map_err(|what| format!("{label}: {what}"))?;
+        let light_in_place = place(light, kind, shape, placed, normalisation, options, root)
+            .map_err(|what| format!("{label}: {what}"))?;
         if light_in_place.intensity.max_element() > 0.0 {
             lights.push(light_in_place);
         }
@@ -65,7 +106,7 @@ pub(crate) fn punctual_lights(
 
 /// The kind of a light at a node; `None` if the node's transform leaves it no direction. Lengths of axes are ignored, as for
 /// cameras.
-fn kind_of(light: &JsonLight, placed: &PlacedNode<'_>) -> Check<Option<LightKind>> {
+fn kind_of(light: &JsonLight, shape: Shape, placed: &PlacedNode<'_>) -> Check<Option<LightKind>> {
     let Checked::Valid(kind) = light.type_ else {
         return Err(damaged("its type is neither point nor spot nor directional"));
     };
@@ -81,6 +122,7 @@ fn kind_of(light: &JsonLight, placed: &PlacedNode<'_>) -> Check<Option<LightKind
                 direction,
                 inner,
                 outer,
+                smooth: shape.smooth,
             })
         }
     })
@@ -111,6 +153,7 @@ fn cone(light: &JsonLight) -> Check<(f64, f64)> {
 fn place(
     light: &JsonLight,
     kind: LightKind,
+    shape: Shape,
     placed: &PlacedNode<'_>,
     normalisation: Normalisation,
     options: &LoadOptions,
@@ -157,9 +200,9 @@ fn place(
         position,
         intensity,
         extent: if is_directional {
-            0.5 * options.sun_angle.to_radians()
+            0.5 * shape.angle.unwrap_or(options.sun_angle.to_radians())
         } else {
-            radius_of(options.light_radius * normalisation.scale)?
+            radius_of(shape.radius.unwrap_or(options.light_radius) * normalisation.scale)?
         },
         range: range.filter(|_| !is_directional),
     })

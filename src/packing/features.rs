@@ -54,7 +54,7 @@ material_features! { features
     coincident_faces: "COINCIDENT_FACES",
     /// Point, spot and directional lights.
     punctual: "PUNCTUAL_LIGHTS",
-    /// Some of those with an extent.
+    /// Some of those with an extent, or spots with a smooth falloff.
     soft: "SOFT_LIGHTS",
     /// Emissive triangles that are divided into several lights.
     parted: "PARTED_LIGHTS",
@@ -79,6 +79,17 @@ impl Light {
     pub(crate) fn is_punctual(&self) -> bool {
         [POINT_LIGHT, SPOT_LIGHT, DIRECTIONAL_LIGHT].contains(&self.kind)
     }
+
+    fn is_smooth_spot(&self) -> bool {
+        self.kind == SPOT_LIGHT && self.area > 0.0
+    }
+
+    /// Spot: 1 − cos of the angle of a spot with full intensity that has the same flux.
+    pub(crate) fn full_versine(&self) -> f64 {
+        let (inner, outer, smooth) = (f64::from(self.inner), f64::from(self.outer), f64::from(self.area));
+        // The integral of the falloff over its width.
+        inner + (outer - inner) * (1.0 / 3.0 + smooth / 6.0)
+    }
 }
 
 impl SceneFeatures {
@@ -95,7 +106,7 @@ impl SceneFeatures {
         }
         for light in lights {
             features.punctual |= light.is_punctual();
-            features.soft |= light.extent > 0.0;
+            features.soft |= light.extent > 0.0 || light.is_smooth_spot();
             features.parted |= light.kind == TRIANGLE_LIGHT && !Part::of(light).is_whole();
             features.environment |= light.kind == ENVIRONMENT_LIGHT;
         }

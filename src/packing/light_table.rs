@@ -188,11 +188,13 @@ fn punctual(scene: &Scene, light: &PunctualLight) -> (Light, f64) {
             direction,
             inner,
             outer,
+            smooth,
         } => Light {
             kind: SPOT_LIGHT,
             direction: direction.to_array(),
             inner: inner as f32,
             outer: outer as f32,
+            area: if smooth { 1.0 } else { 0.0 },
             ..common
         },
         LightKind::Directional { direction } => {

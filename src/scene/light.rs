@@ -19,6 +19,8 @@ pub enum LightKind {
         inner: f64,
         /// 1 − cos of the outer angle, larger than `inner`.
         outer: f64,
+        /// Whether the falloff is a smoothstep, as in Blender, instead of the square of a ramp, as in glTF.
+        smooth: bool,
     },
     /// Along parallel rays, from infinitely far.
     Directional {
@@ -51,8 +53,10 @@ impl PunctualLight {
         intensity
             * match self.kind {
                 LightKind::Point => 4.0 * PI,
-                // The falloff is the square of a ramp, whose integral is a third of its width.
-                LightKind::Spot { inner, outer, .. } => 2.0 * PI * (inner + (outer - inner) / 3.0),
+                // The integral of a squared ramp is a third of its width, that of a smoothstep a half.
+                LightKind::Spot {
+                    inner, outer, smooth, ..
+                } => 2.0 * PI * (inner + (outer - inner) / if smooth { 2.0 } else { 3.0 }),
                 LightKind::Directional { .. } => disc_area,
             }
     }

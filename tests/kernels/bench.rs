@@ -72,6 +72,7 @@ fn add_lights(scene: &mut Scene) {
         direction,
         inner: 0.02,
         outer: 0.2,
+        smooth: false,
     };
     scene.lights = vec![
         light(LightKind::Point, Vec3::new(0.3, 0.5, 0.2), None),

@@ -78,6 +78,23 @@ fn a_spot_falls_off_between_its_angles() {
     });
 }
 
+/// The falloff of Blender's spots.
+#[test]
+fn a_smooth_spot_falls_off_by_a_smoothstep() {
+    let spot = json!({
+        "type": "spot",
+        "intensity": 20,
+        "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.5},
+        "extensions": {"PPMVK_light_shape": {"smooth": true}},
+    });
+    let scene = floor_under(spot, 1.5, -FRAC_PI_2);
+    assert_lit(&scene, 0.05, |point| {
+        let cosine = 1.5 / (1.5 * 1.5 + point.length_squared()).sqrt();
+        let ramp = ((cosine - 0.5_f64.cos()) / (0.2_f64.cos() - 0.5_f64.cos())).clamp(0.0, 1.0);
+        20.0 * of_a_point(point, 1.5) * ramp * ramp * (3.0 - 2.0 * ramp)
+    });
+}
+
 #[test]
 fn a_directional_light_brings_its_lux_times_the_cosine() {
     // From straight down turned back by 30°.

@@ -175,6 +175,7 @@ fn punctual_lights_stand_where_their_nodes_are_and_shine_along_minus_z() {
         direction,
         inner,
         outer,
+        smooth: false,
     } = spot.kind
     else {
         panic!("{spot:?}");
@@ -189,6 +190,39 @@ fn punctual_lights_stand_where_their_nodes_are_and_shine_along_minus_z() {
         panic!("{default_spot:?}");
     };
     assert!(inner == 0.0 && (outer - (1.0 - (PI / 4.0).cos())).abs() < 1e-7);
+}
+
+/// `PPMVK_light_shape` is of one light, and comes before what the options say of all.
+#[test]
+fn a_lights_own_shape_comes_before_that_of_all() {
+    let shaped = |kind: &str, shape: Value| json!({"type": kind, "extensions": {"PPMVK_light_shape": shape}});
+    let mut room = room_with(&[
+        shaped("point", json!({"radius": 0.25})),
+        shaped("spot", json!({"smooth": true})),
+        shaped("directional", json!({"angle": 0.5})),
+        shaped("point", json!({"radius": 0})),
+    ]);
+    room.set("/extensionsUsed", json!(["KHR_lights_punctual", "PPMVK_light_shape"]));
+    let options = || LoadOptions {
+        light_radius: 0.125,
+        sun_angle: 1.0,
+        ..LoadOptions::default()
+    };
+    let scene = room.load_with(options()).expect("a scene");
+    let extents: Vec<f64> = scene.lights.iter().map(|light| light.extent).collect();
+    assert_eq!(extents, [0.25, 0.125, 0.25, 0.0], "in units of the room");
+    assert!(
+        matches!(scene.lights[1].kind, LightKind::Spot { smooth: true, .. }),
+        "{:?}",
+        scene.lights[1]
+    );
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    for shape in [json!({"radius": -1}), json!({"angle": 4}), json!({"radius": "wide"})] {
+        let error = room_with(&[shaped("point", shape.clone())])
+            .load_with(options())
+            .expect_err("a shape");
+        assert!(error.to_string().contains("light 0"), "{shape}: {error}");
+    }
 }
 
 /// Irradiance does not change when lengths are scaled: intensities scale with their squares.
