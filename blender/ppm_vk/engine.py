@@ -60,7 +60,7 @@ class PpmVkRenderEngine(bpy.types.RenderEngine):
         scene = depsgraph.scene
         self.update_stats("", "Exporting the scene")
         warnings = self._on_main_thread(lambda: export.collect(depsgraph, folder))
-        of_exporter = export.run_exporter(folder, self.test_break)
+        of_exporter = export.run_exporter(folder, self._is_cancelled)
         if of_exporter is None:
             raise Cancelled
         exported = self._on_main_thread(lambda: export.complete(depsgraph, folder))
@@ -75,6 +75,9 @@ class PpmVkRenderEngine(bpy.types.RenderEngine):
             self._follow(run, depsgraph.view_layer.name, film, output)
         finally:
             run.kill()
+
+    def _is_cancelled(self):
+        return self.test_break()
 
     def _on_main_thread(self, work):
         """Runs what reads the user's data-blocks while the user can't change them: with a window a render has a thread of its own."""
@@ -98,7 +101,7 @@ class PpmVkRenderEngine(bpy.types.RenderEngine):
         bpy.app.timers.register(timer, first_interval=0)
         while not done.wait(_POLL):
             # A user who cancels makes the main thread wait for this one.
-            if self.test_break():
+            if self._is_cancelled():
                 with lock:
                     if not state["begun"]:
                         state["abandoned"] = True
@@ -115,7 +118,7 @@ class PpmVkRenderEngine(bpy.types.RenderEngine):
         written = False
         while True:
             event = run.next_event(_POLL)
-            if stopped_at is None and self.test_break():
+            if stopped_at is None and self._is_cancelled():
                 run.stop()
                 stopped_at = time.monotonic()
                 self.update_stats("", "Stopping")

@@ -236,7 +236,7 @@ class Cancelling(unittest.TestCase):
         with (
             mock.patch.object(PpmVkRenderEngine, "_show", note_show),
             mock.patch.object(program.Run, "__init__", note_run),
-            mock.patch.object(PpmVkRenderEngine, "test_break", lambda _engine: len(shown) >= 2, create=True),
+            mock.patch.object(PpmVkRenderEngine, "_is_cancelled", lambda _engine: len(shown) >= 2),
         ):
             begin = time.monotonic()
             picture = support.render("PPM_VK")
