@@ -44,12 +44,21 @@ class PpmVkRenderEngine(bpy.types.RenderEngine):
             with tempfile.TemporaryDirectory(prefix="ppm-vk-") as folder:
                 self._render(depsgraph, folder)
         except ProgramError as error:
-            self.error_set(str(error))
+            self._fail(depsgraph, str(error))
         except Cancelled:
-            pass
+            self._show_nothing(depsgraph)
         except Exception as error:
             traceback.print_exc()
-            self.error_set(f"The add-on failed: {error!r}")
+            self._fail(depsgraph, f"The add-on failed: {error!r}")
+
+    def _fail(self, depsgraph, text):
+        self._show_nothing(depsgraph)
+        self.report({"ERROR"}, text)
+
+    def _show_nothing(self, depsgraph):
+        """Blender 4.2 crashes where it saves a picture that is not there."""
+        width, height = Film.of_region(depsgraph.scene.render)[2:]
+        self.end_result(self.begin_result(0, 0, width, height, layer=depsgraph.view_layer.name))
 
     def update_render_passes(self, scene, renderlayer):
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")

@@ -5,24 +5,31 @@ import numpy as np
 _COMPONENTS = "RGBAXYZW"
 
 
+def whole_size(render):
+    share = render.resolution_percentage / 100
+    return int(render.resolution_x * share), int(render.resolution_y * share)
+
+
 class Film:
     def __init__(self, scene, camera, background, can_crop):
         render = scene.render
-        share = render.resolution_percentage / 100
-        # As Blender rounds.
-        self.whole = int(render.resolution_x * share), int(render.resolution_y * share)
-        self.left, self.top = 0, 0
-        self.width, self.height = self.whole
-        if render.use_border:
-            edges = [int(edge * self.whole[0]) for edge in (render.border_min_x, render.border_max_x)]
-            self.left, self.width = edges[0], edges[1] - edges[0]
-            # From below.
-            edges = [int(edge * self.whole[1]) for edge in (render.border_min_y, render.border_max_y)]
-            self.top, self.height = self.whole[1] - edges[1], edges[1] - edges[0]
+        self.whole = whole_size(render)
+        self.left, self.top, self.width, self.height = self.of_region(render)
         self._crops = can_crop and render.use_border
         self._transparent = render.film_transparent
         self._camera = camera
         self._background = background
+
+    @staticmethod
+    def of_region(render):
+        """Left and upper edge, width and height of what is rendered, as Blender rounds."""
+        width, height = whole_size(render)
+        if not render.use_border:
+            return 0, 0, width, height
+        left, right = (int(edge * width) for edge in (render.border_min_x, render.border_max_x))
+        # From below.
+        low, high = (int(edge * height) for edge in (render.border_min_y, render.border_max_y))
+        return left, height - high, right - left, high - low
 
     def arguments(self):
         arguments = [f"--resolution={self.whole[0]}x{self.whole[1]}"]

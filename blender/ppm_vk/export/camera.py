@@ -5,6 +5,7 @@ import math
 import numpy as np
 from mathutils import Matrix
 
+from ..film import whole_size
 from ..program import ProgramError
 
 
@@ -20,8 +21,7 @@ class Camera:
         render = scene.render
         if render.pixel_aspect_x != render.pixel_aspect_y:
             warnings.append("Pixels are square in ppm-vk: the pixel aspect is left out")
-        share = render.resolution_percentage / 100
-        self._size = int(render.resolution_x * share), int(render.resolution_y * share)
+        self._size = whole_size(render)
         self._projection = self._object.calc_matrix_camera(depsgraph, x=self._size[0], y=self._size[1])
         # Without its scale.
         place, rotation, _ = self._object.matrix_world.decompose()

@@ -132,3 +132,6 @@ def export(path):
 
 if __name__ == "__main__":
     main(sys.argv[-1])
+    # Blender's own way out takes time, and as a module may crash.
+    sys.stdout.flush()
+    os._exit(0)
