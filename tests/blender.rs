@@ -1,4 +1,4 @@
-//! Files written by Blender, and pictures as Blender reads them.
+//! Files written by Blender, pictures as Blender reads them, and the add-on.
 //!
 //! `../shared/assets/blender` has files by Blender 5.3. Its calibration scenes are a floor of albedo ½ with one lamp, 2 m above
 //! it or a sun: 100 W for point and spot lights, 3 W/m² for the sun. The tests report it when the folder is missing.
@@ -332,5 +332,60 @@ fn each_kind_of_lamp_has_its_own_extent() {
         let plain = picture(&[]);
         assert_ne!(picture(&[own, "1"]), plain, "{lamp}, {own}");
         assert_eq!(picture(&[other, "1"]), plain, "{lamp}, {other}");
+    }
+}
+
+/// A script of the add-on's tests, in a version of Blender's module; false where the module is missing.
+fn passes_in_blender(version: &str, arguments: &[&str]) -> bool {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let program = Path::new(env!("CARGO_BIN_EXE_ppm-vk"));
+    let output = Command::new(root.join("scripts/blender"))
+        .args(["--version", version, "-u", "-W", "ignore"])
+        .args(arguments)
+        .env("PPM_VK_FOLDER", program.parent().expect("a folder"))
+        .current_dir(root)
+        .output()
+        .expect("scripts/blender runs");
+    let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), stderr(&output));
+    if output.status.code() == Some(77) {
+        println!("skipped with Blender {version}: {said}");
+        return false;
+    }
+    assert!(
+        output.status.success(),
+        "Blender {version}, {arguments:?}, {}: {said}",
+        output.status
+    );
+    let measured = said.lines().filter(|line| line.contains("worst block"));
+    println!("{}", measured.collect::<Vec<_>>().join("\n"));
+    true
+}
+
+#[test]
+#[ignore = "needs Blender's Python module (1 GB) and minutes: scripts/test --long"]
+fn the_add_on_renders_what_cycles_does() {
+    for version in ["5.3", "4.2"] {
+        let files = ["test_parts.py", "test_renders.py", "test_light_levels.py"];
+        let _ = files
+            .iter()
+            .all(|file| passes_in_blender(version, &[&format!("blender/tests/{file}")]));
+    }
+}
+
+#[test]
+#[ignore = "needs Blender's Python module (1 GB): scripts/test --long"]
+fn the_extension_installs() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = TempDir::new().expect("folder");
+    let packed = Command::new(root.join("scripts/blender-extension"))
+        .arg(folder.path())
+        .output()
+        .expect("scripts/blender-extension runs");
+    assert!(packed.status.success(), "{}", stderr(&packed));
+    let zip = std::fs::read_dir(folder.path()).expect("folder").next();
+    let zip = zip.expect("an extension").expect("an entry").path();
+    let zip = zip.to_str().expect("UTF-8");
+    for version in ["5.3", "4.2"] {
+        passes_in_blender(version, &["blender/tests/test_extension.py", zip]);
     }
 }

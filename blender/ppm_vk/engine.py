@@ -1,5 +1,6 @@
 """The render engine: exports the scene, runs the program, and shows what it writes."""
 
+import functools
 import os
 import tempfile
 import threading
@@ -9,8 +10,9 @@ import traceback
 import bpy
 import numpy as np
 
-from . import export, exr, program
+from . import export, exr, main_thread, program
 from .film import Film
+from .main_thread import Cancelled
 from .program import ProgramError
 
 # Seconds between looks at whether the user cancels.
@@ -26,10 +28,6 @@ _PHASES = {
     "iterate": "Rendering",
     "write": "Writing the picture",
 }
-
-
-class Cancelled(Exception):
-    """The user cancels."""
 
 
 class PpmVkRenderEngine(bpy.types.RenderEngine):
@@ -92,33 +90,8 @@ class PpmVkRenderEngine(bpy.types.RenderEngine):
         """Runs what reads the user's data-blocks while the user can't change them: with a window a render has a thread of its own."""
         if bpy.app.background or threading.current_thread() is threading.main_thread():
             return work()
-        outcome = []
-        state = {"begun": False, "abandoned": False}
-        lock, done = threading.Lock(), threading.Event()
-
-        def timer():
-            with lock:
-                if state["abandoned"]:
-                    return
-                state["begun"] = True
-            try:
-                outcome.append((work(), None))
-            except Exception as error:
-                outcome.append((None, error))
-            done.set()
-
-        bpy.app.timers.register(timer, first_interval=0)
-        while not done.wait(_POLL):
-            # A user who cancels makes the main thread wait for this one.
-            if self._is_cancelled():
-                with lock:
-                    if not state["begun"]:
-                        state["abandoned"] = True
-                        raise Cancelled
-        result, error = outcome[0]
-        if error:
-            raise error
-        return result
+        schedule = functools.partial(bpy.app.timers.register, first_interval=0)
+        return main_thread.run(work, schedule, self._is_cancelled)
 
     def _follow(self, run, layer, film, output):
         stopped_at = None

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-_COMPONENTS = "RGBAXYZW"
+_COMPONENTS = "RGBAXYZWV"
 
 
 def whole_size(render):
@@ -70,7 +70,11 @@ def _split(name):
         return "Combined", name
     for separator in "._":
         layer, found, component = name.rpartition(separator)
-        if found and component in tuple(_COMPONENTS):
-            layer = layer.rpartition(".")[2]
-            return layer[:1].upper() + layer[1:], component
-    return name, "X"
+        if found and component.upper() in tuple(_COMPONENTS):
+            return _layer(layer), component.upper()
+    return _layer(name), "X"
+
+
+def _layer(name):
+    name = name.rpartition(".")[2]
+    return name[:1].upper() + name[1:]

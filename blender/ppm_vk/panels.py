@@ -22,6 +22,7 @@ _WITHOUT_EFFECT = {
 _OF_EEVEE = {
     "DATA_PT_EEVEE_light",
     "DATA_PT_camera_dof",
+    "DATA_PT_camera_dof_aperture",
     "EEVEE_MATERIAL_PT_context_material",
     "EEVEE_MATERIAL_PT_surface",
     "EEVEE_MATERIAL_PT_volume",

@@ -61,6 +61,8 @@ class Stills(unittest.TestCase):
             shown.append(film.passes(exr.read(path)))
             show(engine, layer, film, path)
 
+        if bpy.app.version >= (5, 0, 0):
+            self.scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
         self.scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
         self.scene.render.engine = "PPM_VK"
         with tempfile.TemporaryDirectory() as folder, mock.patch.object(PpmVkRenderEngine, "_show", note):

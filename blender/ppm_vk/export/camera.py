@@ -19,6 +19,8 @@ class Camera:
         if self._data.type == "PANO":
             raise ProgramError("The camera is panoramic, which ppm-vk has not: make it perspective or orthographic")
         render = scene.render
+        if render.use_multiview:
+            raise ProgramError("ppm-vk renders one view: turn Stereoscopy off")
         if render.pixel_aspect_x != render.pixel_aspect_y:
             warnings.append("Pixels are square in ppm-vk: the pixel aspect is left out")
         self._size = whole_size(render)

@@ -28,6 +28,15 @@ def _add(document, instance, lights, warnings):
     lamp = instance.object.data
     name = instance.object.original.name
     matrix = instance.matrix_world.copy()
+    of_cycles = getattr(lamp, "cycles", None)
+    if lamp.type == "AREA" and getattr(of_cycles, "is_portal", False):
+        # It emits nothing, but tells a path tracer where a window is.
+        return
+    if not getattr(lamp, "use_shadow", True):
+        warnings.append(f"{name} casts shadows (none in Blender)")
+    linking = getattr(instance.object.original, "light_linking", None)
+    if linking and (linking.receiver_collection or linking.blocker_collection):
+        warnings.append(f"{name} lights all objects: light linking is left out")
     strength = _strength(lamp, name, matrix, warnings)
     if max(strength) <= 0:
         return

@@ -81,6 +81,9 @@ class Materials:
             return
         copy.node_tree.links.new(node.outputs[0], output.inputs["Surface"])
         self._tint(node, entry)
+        thin = node.inputs.get("Thin Wall")
+        if thin and (thin.is_linked or thin.default_value):
+            self._warn(entry, "its walls are thin only where the mesh is not closed")
         for name, none in _WITHOUT_COUNTERPART.items():
             socket = node.inputs.get(name)
             if socket and (socket.is_linked or socket.default_value != none):
