@@ -365,7 +365,12 @@ fn passes_in_blender(version: &str, arguments: &[&str]) -> bool {
 #[ignore = "needs Blender's Python module (1 GB) and minutes: scripts/test --long"]
 fn the_add_on_renders_what_cycles_does() {
     for version in ["5.3", "4.2"] {
-        let files = ["test_parts.py", "test_renders.py", "test_light_levels.py"];
+        let files = [
+            "test_parts.py",
+            "test_renders.py",
+            "test_materials.py",
+            "test_light_levels.py",
+        ];
         let _ = files
             .iter()
             .all(|file| passes_in_blender(version, &[&format!("blender/tests/{file}")]));

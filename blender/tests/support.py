@@ -4,6 +4,7 @@ import math
 import os
 import sys
 import tempfile
+import unittest
 
 import bpy
 import numpy as np
@@ -13,6 +14,14 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import ppm_vk
 
 SIZE = (48, 36)
+
+
+def run():
+    """Runs the tests of a file."""
+    program = unittest.main("__main__", verbosity=2, exit=False)
+    sys.stdout.flush()
+    # Blender 4.2 as a module crashes on its way out.
+    os._exit(not program.result.wasSuccessful())
 
 
 def start():

@@ -41,7 +41,8 @@ class Extension(unittest.TestCase):
 
 if __name__ == "__main__":
     _ZIP = os.path.abspath(sys.argv.pop())
-    try:
-        unittest.main(verbosity=2)
-    finally:
-        shutil.rmtree(_RESOURCES)
+    program = unittest.main(verbosity=2, exit=False)
+    shutil.rmtree(_RESOURCES)
+    sys.stdout.flush()
+    # Blender 4.2 as a module crashes on its way out.
+    os._exit(not program.result.wasSuccessful())

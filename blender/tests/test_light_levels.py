@@ -104,4 +104,4 @@ class LightLevels(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    support.run()

@@ -115,4 +115,4 @@ class Panels(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    support.run()

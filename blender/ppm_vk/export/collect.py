@@ -47,7 +47,8 @@ class Collected:
         """Writes materials and arrays into a folder."""
         np.savez(os.path.join(folder, "arrays.npz"), **self._arrays)
         local = {material for material in self._materials.values() if not material.library}
-        bpy.data.libraries.write(os.path.join(folder, "materials.blend"), local, path_remap="ABSOLUTE", fake_user=True)
+        if local:
+            bpy.data.libraries.write(os.path.join(folder, "materials.blend"), local, path_remap="ABSOLUTE", fake_user=True)
         materials = [
             {
                 "name": material.name,
