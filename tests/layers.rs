@@ -148,7 +148,11 @@ fn layers_show_where_surfaces_are_and_what_they_reflect() {
             ],
             &what,
         );
-        assert_eq!((file.at("samples", pixel), file.at("A", pixel)), (8.0 * 2.0, 1.0), "{what}");
+        assert_eq!(
+            (file.at("samples", pixel), file.at("A", pixel)),
+            (8.0 * 2.0, 1.0),
+            "{what}"
+        );
     }
     for wall in ["back", "left", "right", "floor"] {
         assert!(found.get(wall).is_some_and(|&pixels| pixels > 20), "{wall}: {found:?}");

@@ -128,7 +128,10 @@ pub fn write_exr(image: &Image, additions: Additions<'_>, path: &Path, metadata:
     for (component, samples) in ["R", "G", "B"].into_iter().zip(planes(image)) {
         add(&additions.combined(component), samples);
     }
-    let layers = [(additions.errors, "error", "Error"), (additions.noisy, "noisy", "Noisy Image")];
+    let layers = [
+        (additions.errors, "error", "Error"),
+        (additions.noisy, "noisy", "Noisy Image"),
+    ];
     for (layer, alone, in_view_layer) in layers {
         let planes = layer.into_iter().flat_map(planes);
         for (component, samples) in ["R", "G", "B"].into_iter().zip(planes) {
