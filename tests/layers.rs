@@ -113,8 +113,20 @@ fn layers_show_where_surfaces_are_and_what_they_reflect() {
             objects_cover <= 1.0 && (objects_cover - materials_cover).abs() < 1e-6,
             "pixel {pixel}: {objects_cover} covered by objects, {materials_cover} by materials"
         );
-        // All eight paths meet one wall.
+        // All eight paths meet one wall, and so do those of the pixels around: the first path passes the pixel's centre for the
+        // objects, and another point of it for albedo and normal.
         let [(object, share)] = &objects[..] else { continue };
+        let (x, y) = (pixel % SIDE, pixel / SIDE);
+        if !(1..SIDE - 1).contains(&x) || !(1..SIDE - 1).contains(&y) {
+            continue;
+        }
+        let around = [pixel - 1, pixel + 1, pixel - SIDE, pixel + SIDE];
+        if around
+            .iter()
+            .any(|&pixel| file.covers("CryptoObject", pixel) != objects)
+        {
+            continue;
+        }
         if *share < 1.0 {
             continue;
         }
