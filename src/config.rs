@@ -250,6 +250,11 @@ impl RenderConfig {
         self.part.seed(self.seed)
     }
 
+    /// Whether an iteration finds visible points: those of the paper are found once.
+    pub fn finds_visible_points(&self, iteration: u32) -> bool {
+        iteration == 0 || self.estimator == Estimator::Sppm
+    }
+
     /// Whether photons that no visible point can accept are dropped where they land. The paper keeps all photons.
     pub fn drops_unwanted(&self) -> bool {
         self.drop_unwanted && self.estimator == Estimator::Sppm

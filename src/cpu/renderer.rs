@@ -250,7 +250,7 @@ impl Backend for Renderer {
             run: Run::default(),
         };
         let mut turn = CameraTurn::that_gathers(&self.config, iteration);
-        if iteration == 0 || self.config.estimator == Estimator::Sppm {
+        if self.config.finds_visible_points(iteration) {
             self.paths = clock.time("camera", || self.trace_camera_paths(turn));
         }
         // Equation 2 has shrunk them, also where the visible points stay.

@@ -68,7 +68,7 @@ impl Stages<'_> {
     /// The stages before an iteration's photons.
     pub(super) fn begin(&self, iteration: u32, recording: &mut Recording) {
         let (order, _) = self.method();
-        if iteration == 0 || self.config.estimator == Estimator::Sppm {
+        if self.config.finds_visible_points(iteration) {
             let turn = CameraTurn::that_gathers(self.config, iteration);
             self.camera(turn, recording);
             order(self.sizes, recording);
@@ -106,8 +106,7 @@ impl Stages<'_> {
                 .bind(vec![sums_of(iteration)]),
         );
         // After the photons, because an iteration that has to be repeated must stop before it adds anything.
-        let meets_anew = iteration == 0 || self.config.estimator == Estimator::Sppm;
-        if self.config.layers.show_surfaces() && meets_anew {
+        if self.config.layers.show_surfaces() && self.config.finds_visible_points(iteration) {
             recording.dispatch(
                 self.ray_stage(&shaders::LAYERS, self.sizes.pixel_slots)
                     .push(shaders::CameraTurnPush::from(turn)),
