@@ -11,7 +11,7 @@ mod tone;
 pub use crate::files::{check_writable, write_whole};
 pub use cryptomatte::Cryptomatte;
 pub use hdr::{hdr_pixels, read_hdr};
-pub use openexr::{Additions, Channel, exr_pixels, read_exr, write_exr};
+pub use openexr::{Additions, Channel, ViewLayer, exr_pixels, read_exr, write_exr};
 pub use png::{write_png, write_rgb8};
 pub use tone::{Exposure, Look, Tone};
 

@@ -61,8 +61,9 @@ void main() {
         uint slot = pixel_slot * settings.slots_per_pixel + i;
         DirectSum sum = direct_sums[slot];
         // Flux is divided by emitted photons first: both grow without bound, their quotient does not.
-        radiance += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
-        parts.direct.rgb += (sum.high.rgb + sum.low.rgb) / float(push.iterations);
+        vec3 direct = (sum.high.rgb + sum.low.rgb) / float(push.iterations);
+        radiance += direct;
+        parts.direct.rgb += direct;
         glass.unbent += unbent_of(sum);
         has_surface = has_surface || coverage[slot].surrounded > 0u;
         // The slots of a pixel share its camera paths.

@@ -57,6 +57,18 @@ pub struct Channel {
     pub samples: Vec<f32>,
 }
 
+/// The name of a view layer, if channels are named as Blender names them: `NAME.Combined.R` instead of `R`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ViewLayer<'a>(pub Option<&'a str>);
+
+impl ViewLayer<'_> {
+    /// The one of a channel's or layer's two names that is used: alone, or in the view layer.
+    pub fn name(self, alone: &str, in_view_layer: &str) -> String {
+        self.0
+            .map_or(alone.to_owned(), |name| format!("{name}.{in_view_layer}"))
+    }
+}
+
 /// What a picture's file has beside the colours.
 #[derive(Debug, Clone, Default)]
 pub struct Additions<'a> {
@@ -72,23 +84,8 @@ pub struct Additions<'a> {
     pub channels: Vec<Channel>,
     /// Further attributes, texts by their names.
     pub attributes: Vec<(String, String)>,
-    /// Name of the view layer, as Blender names channels: `NAME.Combined.R`. Without it colours are `R`, `G`, `B`.
-    pub view_layer: Option<&'a str>,
-}
-
-impl Additions<'_> {
-    /// Name of a colour channel.
-    fn combined(&self, component: &str) -> String {
-        self.view_layer
-            .map_or(component.to_owned(), |name| format!("{name}.Combined.{component}"))
-    }
-
-    /// Name of a channel of a layer that every file may have, alone and in a view layer.
-    fn layer(&self, alone: &str, in_view_layer: &str, component: &str) -> String {
-        self.view_layer.map_or(format!("{alone}_{component}"), |name| {
-            format!("{name}.{in_view_layer}.{component}")
-        })
-    }
+    /// How channels are named.
+    pub view_layer: ViewLayer<'a>,
 }
 
 /// The samples of an image's three components.
@@ -125,8 +122,10 @@ pub fn write_exr(image: &Image, additions: Additions<'_>, path: &Path, metadata:
         let name = Text::from_slice_unchecked(name.as_bytes());
         channels.push(AnyChannel::new(name, FlatSamples::F32(samples)));
     };
+    let view_layer = additions.view_layer;
+    let combined = |component: &str| view_layer.name(component, &format!("Combined.{component}"));
     for (component, samples) in ["R", "G", "B"].into_iter().zip(planes(image)) {
-        add(&additions.combined(component), samples);
+        add(&combined(component), samples);
     }
     let layers = [
         (additions.errors, "error", "Error"),
@@ -135,11 +134,12 @@ pub fn write_exr(image: &Image, additions: Additions<'_>, path: &Path, metadata:
     for (layer, alone, in_view_layer) in layers {
         let planes = layer.into_iter().flat_map(planes);
         for (component, samples) in ["R", "G", "B"].into_iter().zip(planes) {
-            add(&additions.layer(alone, in_view_layer, component), samples);
+            let name = view_layer.name(&format!("{alone}_{component}"), &format!("{in_view_layer}.{component}"));
+            add(&name, samples);
         }
     }
     if let Some(alpha) = additions.alpha {
-        add(&additions.combined("A"), alpha.to_vec());
+        add(&combined("A"), alpha.to_vec());
     }
     for channel in additions.channels {
         add(&channel.name, channel.samples);

@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 
 use crate::backend::{LayerFilms, Resolved};
 use crate::config::{Layer, Layers};
-use crate::film::{Channel, Cryptomatte};
-use crate::layout::{IDS_OF_PIXEL, IdCount, LightParts, SurfaceSum};
+use crate::film::{Channel, Cryptomatte, ViewLayer};
+use crate::layout::{IDS_OF_PIXEL, IdCount, SurfaceSum};
 use crate::scene::{Normalisation, Scene};
 
 /// Depth where there is no surface, as Blender has it.
@@ -39,8 +39,8 @@ pub(super) struct LayersOf<'a> {
     pub names: &'a SceneNames,
     /// Camera paths of each pixel.
     pub samples: u32,
-    /// Name of the view layer, as Blender names channels.
-    pub view_layer: Option<&'a str>,
+    /// How channels are named.
+    pub view_layer: ViewLayer<'a>,
 }
 
 /// Names of a layer's channels by those who write them alone, and in a view layer, as Blender and Cycles do.
@@ -67,35 +67,32 @@ impl LayersOf<'_> {
     /// Channels and attributes of the file; the error's are the file's own.
     pub fn additions(&self) -> (Vec<Channel>, Vec<(String, String)>) {
         let (mut channels, mut attributes) = (Vec::new(), Vec::new());
+        let (surfaces, light) = (self.films().surfaces.iter(), self.films().light.iter());
         for layer in self.layers.iter() {
+            let (surfaces, light) = (surfaces.clone(), light.clone());
             match layer {
-                Layer::Albedo => channels.extend(self.surface_planes(layer, COLOUR, SurfaceSum::mean_albedo)),
-                Layer::Normal => channels.extend(self.surface_planes(layer, VECTOR, SurfaceSum::mean_normal)),
+                Layer::Albedo => channels.extend(self.planes(layer, COLOUR, surfaces.map(SurfaceSum::mean_albedo))),
+                Layer::Normal => channels.extend(self.planes(layer, VECTOR, surfaces.map(SurfaceSum::mean_normal))),
                 Layer::Position => {
-                    channels.extend(self.surface_planes(layer, VECTOR, |sum| self.world_position(sum)));
+                    channels.extend(self.planes(layer, VECTOR, surfaces.map(|sum| self.world_position(sum))));
                 }
-                Layer::Depth => {
-                    let depth = self.films().surfaces.iter().map(|sum| self.world_depth(sum));
-                    channels.push(self.plane(layer, depth.collect()));
-                }
+                Layer::Depth => channels.push(self.plane(layer, surfaces.map(|sum| self.world_depth(sum)).collect())),
                 Layer::Samples => {
                     let pixels = self.picture.image.pixels().len();
                     channels.push(self.plane(layer, vec![self.samples as f32; pixels]));
                 }
-                Layer::Direct => channels.extend(self.light_planes(layer, |parts| parts.direct)),
-                Layer::Indirect => channels.extend(self.light_planes(layer, |parts| parts.indirect)),
-                Layer::Caustic => channels.extend(self.light_planes(layer, |parts| parts.caustic)),
+                Layer::Direct => channels.extend(self.planes(layer, COLOUR, light.map(|parts| rgb(parts.direct)))),
+                Layer::Indirect => channels.extend(self.planes(layer, COLOUR, light.map(|parts| rgb(parts.indirect)))),
+                Layer::Caustic => channels.extend(self.planes(layer, COLOUR, light.map(|parts| rgb(parts.caustic)))),
                 Layer::Object | Layer::Material => {
-                    let matte = Cryptomatte {
-                        name: self.name(layer),
-                        things: if layer == Layer::Object {
-                            &self.names.objects
-                        } else {
-                            &self.names.materials
-                        },
+                    let (things, table) = match layer {
+                        Layer::Object => (&self.names.objects, 0),
+                        _ => (&self.names.materials, 1),
                     };
+                    let name = self.name(layer);
+                    let matte = Cryptomatte { name, things };
                     attributes.extend(matte.attributes());
-                    channels.extend(matte.channels(self.shares(layer == Layer::Material)));
+                    channels.extend(matte.channels(self.shares(table)));
                 }
                 Layer::Error => {}
             }
@@ -109,8 +106,7 @@ impl LayersOf<'_> {
 
     fn name(&self, layer: Layer) -> String {
         let (alone, in_view_layer) = channel_names(layer);
-        self.view_layer
-            .map_or(alone.to_owned(), |name| format!("{name}.{in_view_layer}"))
+        self.view_layer.name(alone, in_view_layer)
     }
 
     /// A layer of one channel.
@@ -121,30 +117,14 @@ impl LayersOf<'_> {
         }
     }
 
-    fn planes(&self, layer: Layer, components: [&str; 3], values: &[[f32; 3]]) -> [Channel; 3] {
+    /// A layer of three channels.
+    fn planes(&self, layer: Layer, components: [&str; 3], values: impl Iterator<Item = [f32; 3]>) -> [Channel; 3] {
         let name = self.name(layer);
+        let values: Vec<[f32; 3]> = values.collect();
         std::array::from_fn(|component| Channel {
             name: format!("{name}.{}", components[component]),
             samples: values.iter().map(|value| value[component]).collect(),
         })
-    }
-
-    fn surface_planes(
-        &self,
-        layer: Layer,
-        components: [&str; 3],
-        value: impl Fn(&SurfaceSum) -> [f32; 3],
-    ) -> [Channel; 3] {
-        let values: Vec<[f32; 3]> = self.films().surfaces.iter().map(value).collect();
-        self.planes(layer, components, &values)
-    }
-
-    fn light_planes(&self, layer: Layer, value: impl Fn(&LightParts) -> [f32; 4]) -> [Channel; 3] {
-        let values = self.films().light.iter().map(|parts| {
-            let [r, g, b, _] = value(parts);
-            [r, g, b]
-        });
-        self.planes(layer, COLOUR, &values.collect::<Vec<_>>())
     }
 
     /// World units; the origin where there is no surface.
@@ -164,18 +144,20 @@ impl LayersOf<'_> {
         (f64::from(sum.depth) / self.names.normalisation.scale) as f32
     }
 
-    /// Of each pixel, indices of objects or materials, and the shares of it that they cover.
-    fn shares(&self, of_materials: bool) -> impl Iterator<Item = Vec<(u32, f32)>> {
-        let ids = IDS_OF_PIXEL as usize;
-        let tables = self.films().ids.chunks_exact(2 * ids);
-        self.films().surfaces.iter().zip(tables).map(move |(sum, table)| {
-            let (objects, materials) = table.split_at(ids);
-            let table = if of_materials { materials } else { objects };
+    /// Of each pixel, indices in one of its tables, objects or materials, and the shares of it that they cover.
+    fn shares(&self, table: usize) -> impl Iterator<Item = Vec<(u32, f32)>> {
+        let tables = self.films().ids.chunks_exact(IDS_OF_PIXEL as usize);
+        let tables = tables.skip(table).step_by(2);
+        self.films().surfaces.iter().zip(tables).map(|(sum, table)| {
             let used = table.iter().filter(|entry| entry.count > 0);
             used.map(|&IdCount { id, count }| (id, count as f32 / sum.paths.max(1) as f32))
                 .collect()
         })
     }
+}
+
+fn rgb([r, g, b, _]: [f32; 4]) -> [f32; 3] {
+    [r, g, b]
 }
 
 impl SurfaceSum {

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 #[cfg(test)]
 use crate::estimate::OnePhoton;
 use crate::estimate::{ErrorEstimate, RelativeError};
-use crate::film::{self, Additions, Image, Look, Metadata};
+use crate::film::{self, Additions, Image, Look, Metadata, ViewLayer};
 use crate::report::{Profile, Subject};
 
 /// The failure that ended a render early.
@@ -254,6 +254,7 @@ impl Rendered {
     /// As [`Rendered::write_exr`].
     pub fn write_view_layer(&self, path: &Path, view_layer: Option<&str>) -> Result<()> {
         let errors = self.pixel_errors();
+        let view_layer = ViewLayer(view_layer);
         let layers = LayersOf {
             layers: self.of.layers,
             picture: &self.of.picture,
