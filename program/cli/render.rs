@@ -132,11 +132,10 @@ impl Job<'_> {
             rendered = session.render_with(until, &hooks);
         }
         events.begin(Phase::Write);
-        let mut denoised = Ok(());
-        let rendered = rendered.map(|mut rendered| {
-            denoised = denoise(&mut rendered, denoiser.as_ref());
-            Arc::new(rendered)
-        });
+        let denoised = rendered
+            .as_mut()
+            .map_or(Ok(()), |rendered| denoise(rendered, denoiser.as_ref()));
+        let rendered = rendered.map(Arc::new);
         takers.end(rendered.as_ref().ok());
         let rendered = rendered?;
         tell_warnings(events, &rendered.warnings());
