@@ -16,6 +16,7 @@ from mathutils import Matrix, Vector
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 import ppm_vk
+from parts import mesh, world
 
 # ---- parts
 
@@ -75,16 +76,6 @@ def glowing(name, color, strength):
     return material(name, Base_Color=(0, 0, 0, 1), Specular_IOR_Level=0, Emission_Color=(*color, 1), Emission_Strength=strength)
 
 
-def mesh(name, corners, faces, of_material, smooth=False):
-    made = bpy.data.meshes.new(name)
-    made.from_pydata(corners, [], faces)
-    made.materials.append(of_material)
-    if smooth:
-        made.polygons.foreach_set("use_smooth", [True] * len(made.polygons))
-    made.update()
-    return made
-
-
 def lathe(name, outline, of_material, sides=96, smooth=True):
     """A closed outline of (radius, height), counter-clockwise, turned about z; the axis where the radius is 0."""
     corners, rings = [], []
@@ -135,16 +126,6 @@ def sphere(name, radius, of_material, inner=None, rings=48):
 def torus(name, radius, thickness, of_material, sides=128, flat=1.0):
     turns = [2 * math.pi * i / 48 for i in range(48)]
     return lathe(name, [(radius + thickness * math.cos(t), flat * thickness * math.sin(t)) for t in turns], of_material, sides)
-
-
-def world(color, strength=1.0):
-    made = bpy.data.worlds.new("world")
-    made.use_nodes = True
-    background = made.node_tree.nodes["Background"]
-    background.inputs["Color"].default_value = (*color, 1)
-    background.inputs["Strength"].default_value = strength
-    bpy.context.scene.world = made
-    return made
 
 
 def tumbler(height=0.09, radius=0.04, wall=0.003, base=0.01):

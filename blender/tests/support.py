@@ -12,6 +12,7 @@ from mathutils import Matrix, Vector
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 import ppm_vk
+from parts import mesh, world
 
 SIZE = (48, 36)
 
@@ -104,13 +105,6 @@ def grey(albedo=0.5):
     return material("grey", Color=(albedo, albedo, albedo, 1))
 
 
-def mesh(name, corners, faces, of_material):
-    made = bpy.data.meshes.new(name)
-    made.from_pydata(corners, [], faces)
-    made.materials.append(of_material)
-    return made
-
-
 def plane(name, half, of_material, **where):
     return link(name, mesh(name, [(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [(0, 1, 2, 3)], of_material), **where)
 
@@ -125,16 +119,6 @@ def blocks(picture, count=(4, 3)):
     """Means of RGB over parts of a picture."""
     height, width, _ = picture.shape
     return picture[..., :3].reshape(count[1], height // count[1], count[0], width // count[0], 3).mean(axis=(1, 3))
-
-
-def world(color=(0, 0, 0), strength=1.0):
-    made = bpy.data.worlds.new("world")
-    made.use_nodes = True
-    background = made.node_tree.nodes["Background"]
-    background.inputs["Color"].default_value = (*color, 1)
-    background.inputs["Strength"].default_value = strength
-    bpy.context.scene.world = made
-    return made
 
 
 def world_of(image, strength, turn):
