@@ -16,7 +16,7 @@ layout(push_constant) uniform CountPush {
 
 struct Asked {
     vec4 position;
-    vec4 normal;
+    vec4 normal; // w: share of directions that are aimed
     vec4 u;
 };
 
@@ -30,6 +30,6 @@ void main() {
     }
     Asked a = asked[i];
     vec3 direction = cosine_direction(a.normal.xyz, a.u.xy);
-    float weight = guide(a.position.xyz, a.normal.xyz, a.u, direction);
+    float weight = guide(a.position.xyz, a.normal.xyz, a.u, a.normal.w, direction);
     found[i] = vec4(direction, weight);
 }

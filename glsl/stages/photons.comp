@@ -39,6 +39,7 @@ struct Path {
     PlacedTriangle ignored;
     Media media; // of the ray
     float wavelength; // nm; 0: all wavelengths
+    float guided; // factor by which aiming at bounces has weighted the flux
     bool seen_directly; // no bounce since the light: direct light, which `direct` samples
     bool caustic;       // only mirrors and glass since the light
     float inverse_range; // of the light, until the first surface
@@ -54,6 +55,7 @@ Path path_from(uint start) {
     path.ignored = PlacedTriangle(from.triangle, NO_INSTANCE);
     path.media = media_of_light(from.light);
     path.wavelength = 0.0;
+    path.guided = 1.0;
     path.seen_directly = true;
     path.caustic = true;
     path.inverse_range = from.inverse_range;
@@ -97,7 +99,7 @@ void main() {
     bool alive = false;
     // Values that are equal for all paths are set before the loop: they take no vector registers.
     Random random = random_of_path(lane);
-    Path path = Path(vec3(0.0), vec3(0.0), vec3(0.0), 0u, NO_TRIANGLE, IN_VACUUM, 0.0, true, true, 0.0);
+    Path path = Path(vec3(0.0), vec3(0.0), vec3(0.0), 0u, NO_TRIANGLE, IN_VACUUM, 0.0, 1.0, true, true, 0.0);
     uint truncated = 0u;
     uint non_finite = 0u;
     bool finished = false;
@@ -169,13 +171,15 @@ void main() {
                 BsdfSample way = sample_bsdf(met, incoming, u, path.wavelength, random);
                 float guided = 1.0;
                 if (AIMED && way.lambertian) {
-                    guided = guide(met.surface.position, met.frame.geometric_normal, u, way.direction);
+                    float share = guided_share(path.guided);
+                    guided = guide(met.surface.position, met.frame.geometric_normal, u, share, way.direction);
                 }
                 path.flux *= way.color;
                 vec3 scattered = path.flux * way.weight;
                 alive = is_possible(way, met.frame) && finite(scattered) && survives(path.flux, scattered, u.z);
                 // Weighted after Russian roulette: many aimed photons survive, with less flux each.
                 path.flux *= guided;
+                path.guided *= guided;
                 alive = alive && guided > 0.0;
                 path.direction = way.direction;
                 path.caustic = path.caustic && way.specular;

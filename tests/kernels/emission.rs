@@ -203,15 +203,15 @@ fn guided_photons_leave_as_by_the_cosine() {
     assert!(view < targets, "nothing is guided in this scene");
     let sphere = table[1 + view as usize];
     let (centre, radius) = (sphere.truncate().as_dvec3(), f64::from(sphere.w));
-    // From just outside of where all is near, from afar, and from below the horizon in part.
-    for (way, lean) in [(2.05, 0.0), (2.05, 1.0), (2.3, 1.4), (4.0, 0.5)] {
+    // From just outside of where all is near, from afar, and from below the horizon in part; by half of the photons, and by fewer.
+    for (way, lean, share) in [(2.05, 0.0, 0.5), (2.05, 1.0, 0.5), (2.3, 1.4, 0.375), (4.0, 0.5, 0.05)] {
         let axis = DVec3::new(0.48, 0.6, 0.64);
         let across = DVec3::new(0.8, 0.0, -0.6);
         let normal = axis * f64::cos(lean) + across * f64::sin(lean);
         let position = (centre - way * radius * axis).as_vec3().extend(0.0).to_array();
         let ask = |u: [f32; 4]| AskedGuide {
             position,
-            normal: normal.as_vec3().extend(0.0).to_array(),
+            normal: normal.as_vec3().extend(share).to_array(),
             u,
         };
         let asked: Vec<AskedGuide> = random_numbers(COUNT).map(ask).collect();
@@ -223,8 +223,13 @@ fn guided_photons_leave_as_by_the_cosine() {
         };
         let hits = found.iter().filter(is_hit).count();
         assert!(
-            hits > found.len() / 3,
+            hits as f32 > 0.6 * share * found.len() as f32,
             "{way} radii away: {hits} of {COUNT} go to the view"
+        );
+        let most = found.iter().map(|found| found[3]).fold(0.0, f32::max);
+        assert!(
+            most <= 1.0001 / (1.0 - share),
+            "{way} radii away: a photon's flux is weighted by {most}, by {share} of them"
         );
         for (what, factor, expected) in [
             ("number", None, 1.0),
