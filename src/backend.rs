@@ -305,9 +305,10 @@ pub fn settings(config: &RenderConfig, scene: &PackedScene, camera: &Camera, loo
         demand_floor2: 1.0,
         near_light_count: scene.near_lights.len() as u32,
         light_source_count: scene.light_sources.len() as u32,
-        padding0: 0,
-        padding1: 0,
-        padding2: 0,
+        guide_step: config.guides().step,
+        guides: config.guides().size,
+        region_origin: config.region().origin,
+        region_size: config.region().size,
         filter_places: bytemuck::cast(config.filter.places()),
         camera_media: scene.immersion.media_at(camera.position),
     }

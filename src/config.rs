@@ -5,6 +5,7 @@ mod filter;
 mod layers;
 mod part;
 pub mod ranges;
+mod region;
 mod tiles;
 
 pub use choice::Choice;
@@ -12,6 +13,7 @@ pub(crate) use choice::choices;
 pub use filter::PixelFilter;
 pub use layers::{Layer, Layers};
 pub use part::Part;
+pub use region::{Guides, Region};
 pub use tiles::pixel_of;
 
 use std::fmt::Display;
@@ -113,8 +115,10 @@ impl Sampler {
 /// A render's settings.
 #[derive(Debug, Clone)]
 pub struct RenderConfig {
-    /// Pixels, width and height.
+    /// Pixels of the whole picture, width and height.
     pub resolution: [u32; 2],
+    /// The part of it that is rendered, with the same bits as in the whole; all of it if `None`.
+    pub crop: Option<Region>,
     /// Photon paths emitted in an iteration.
     pub photons: u32,
     /// Which visible points an iteration uses.
@@ -201,6 +205,7 @@ impl RenderConfig {
     /// The defaults, also of the program's arguments.
     pub const DEFAULT: Self = Self {
         resolution: [1280, 720],
+        crop: None,
         photons: 100_000,
         estimator: Estimator::Sppm,
         direct: Direct::Light,
@@ -232,6 +237,9 @@ impl RenderConfig {
             format!("{width}x{height}"),
             ranges::resolution(self.resolution),
         )?;
+        if let Some(crop) = self.crop {
+            in_range(Setting::Crop, crop, ranges::crop(crop, self.resolution))?;
+        }
         in_range(Setting::Alpha, self.alpha, ranges::alpha(self.alpha))?;
         in_range(Setting::Photons, self.photons, ranges::count(self.photons))?;
         in_range(Setting::MaxDepth, self.max_depth, ranges::count(self.max_depth))?;

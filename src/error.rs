@@ -83,6 +83,8 @@ pub enum Setting {
     Radius,
     /// A part of several.
     Part,
+    /// [`RenderConfig::crop`](crate::RenderConfig::crop).
+    Crop,
     /// Bounces of a path.
     MaxDepth,
     /// Photons of a grid cell.
@@ -105,6 +107,7 @@ impl fmt::Display for Setting {
             Self::Alpha => "alpha",
             Self::Radius => "radius",
             Self::Part => "part",
+            Self::Crop => "crop",
             Self::MaxDepth => "max_depth",
             Self::CellPhotons => "cell_photons",
             Self::Gather => "gather",

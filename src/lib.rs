@@ -82,7 +82,7 @@ mod text;
 
 pub use backend::{Counters, DeviceDescription, Phase};
 pub use config::{
-    Accel, Choice, Direct, EmissionChoice, Estimator, Layer, Layers, Part, PixelFilter, RenderConfig, Sampler,
+    Accel, Choice, Direct, EmissionChoice, Estimator, Layer, Layers, Part, PixelFilter, Region, RenderConfig, Sampler,
     TriangleTest,
 };
 pub use denoise::{Denoiser, Guides};

@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{EmissionChoice, Estimator, Layers, RenderConfig};
+use std::ops::Range;
+
+use crate::config::{EmissionChoice, Estimator, Guides, Layers, Region, RenderConfig};
 use crate::layout::{
     BehindGlass, Centroid, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, GridShape, IDS_OF_PIXEL,
     IdCount, LightParts, PathStart, Photon, SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters,
-    SurfaceSum, TILE, VisibleLobes, VisiblePoint, packed_bsdf_texels,
+    SurfaceSum, VisibleLobes, VisiblePoint, packed_bsdf_texels,
 };
 use crate::stage::{BufferId, SEQUENCE_FILMS, SEQUENCE_SUMS};
 
@@ -40,9 +42,13 @@ const EMISSION_TABLE_BYTES: usize =
 /// Sizes of a render's buffers, in elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sizes {
-    /// Pixels, width and height.
-    pub resolution: [u32; 2],
-    /// Slots for pixels: whole tiles.
+    /// The pixels that are rendered.
+    pub region: Region,
+    /// Slots for them.
+    pub region_slots: u32,
+    /// The guides, which are rendered in addition.
+    pub guides: Guides,
+    /// Slots for all of these.
     pub pixel_slots: u32,
     /// Visible points a pixel.
     pub slots_per_pixel: u32,
@@ -130,21 +136,29 @@ const EXPECTED_PHOTONS: f64 = 5.0;
 impl Sizes {
     /// The sizes for a render.
     pub fn new(config: &RenderConfig, limits: Limits) -> Self {
-        let [width, height] = config.resolution;
-        let pixel_slots = width.div_ceil(TILE) * height.div_ceil(TILE) * TILE * TILE;
+        let (region, guides) = (config.region(), config.guides());
+        let region_slots = region.slots();
+        let pixel_slots = region_slots + guides.slots();
         let fitting = limits.storage_buffer_bytes / size_of::<VisiblePoint>() as u64 / u64::from(pixel_slots);
         let slots_per_pixel = match config.estimator {
             Estimator::Ppm if limits.splitting => PPM_SLOTS.min(fitting.max(1) as u32),
             _ => 1,
         };
-        let two_maps = 2 * size_of::<Statistics>() as u64 * u64::from(pixel_slots);
+        let fit = |maps: u64, slots: u32| {
+            maps * size_of::<Statistics>() as u64 * u64::from(slots) <= limits.storage_buffer_bytes
+        };
+        // A crop has as many as the whole, if that can be rendered at once.
+        let whole = Region::whole(config.resolution).slots() + guides.slots();
+        let fits_two_maps = fit(2, pixel_slots) && (fit(2, whole) || !fit(1, whole));
         let photons_at_most = (limits.storage_buffer_bytes / size_of::<Photon>() as u64) as u32;
         let batch_paths = config
             .photons
             .min((f64::from(photons_at_most) / (2.0 * EXPECTED_PHOTONS)) as u32)
             .max(1);
         let mut sizes = Self {
-            resolution: config.resolution,
+            region,
+            region_slots,
+            guides,
             pixel_slots,
             slots_per_pixel,
             batch_paths,
@@ -158,7 +172,7 @@ impl Sizes {
             object_cells: limits.object_cells,
             // One photon map for the paper's estimator, and if the device can't bind two for this picture.
             photon_maps: match config.estimator {
-                Estimator::Sppm if limits.specular && two_maps <= limits.storage_buffer_bytes => 2,
+                Estimator::Sppm if limits.specular && fits_two_maps => 2,
                 _ => 1,
             },
             lobes: limits.lobes,
@@ -218,7 +232,8 @@ impl Sizes {
 
     /// Size of the buffer `id` in bytes; `None` for buffers of the scene.
     pub fn bytes(&self, id: BufferId) -> Option<u64> {
-        let pixels = u64::from(self.resolution[0]) * u64::from(self.resolution[1]);
+        let pixels = self.region.pixels();
+        let guides = u64::from(self.guides.slots());
         let slots = u64::from(self.slots());
         let receivers = u64::from(self.receivers());
         let photons = u64::from(self.photon_capacity);
@@ -249,7 +264,7 @@ impl Sizes {
             // Whole texels of four.
             BufferId::Radii2 => (receivers, 4),
             BufferId::RadiiOfShells => (2 * SHELLS as u64, size_of::<ShellRadii>()),
-            BufferId::Film => (pixels, 16),
+            BufferId::Film => (pixels + guides, 16),
             id if SEQUENCE_FILMS.contains(&id) => (pixels, 16),
             BufferId::GlassFilm => (pixels, size_of::<BehindGlass>()),
             BufferId::LightPartsFilm => (
@@ -304,9 +319,19 @@ impl Sizes {
         self.slots() * self.photon_maps
     }
 
-    /// Step between the receivers whose radii are averaged for a grid: odd, so that it includes all slots of a pixel.
+    /// Step between the receivers whose radii are averaged for a grid: odd, so that it includes all slots of a pixel. Guides
+    /// that are rendered in addition are few.
     pub fn radius_step(&self) -> u32 {
+        if self.guides.slots() > 0 {
+            return 1;
+        }
         (self.receivers() / RADIUS_SAMPLES) | 1
+    }
+
+    /// The slots from which is learned what all share.
+    pub fn guide_slots(&self) -> Range<usize> {
+        let first = if self.guides.slots() > 0 { self.region_slots } else { 0 };
+        (first * self.slots_per_pixel) as usize..self.slots() as usize
     }
 
     /// Number of photons that all lanes can store.

@@ -2,6 +2,8 @@
 // the gather, so that a disc reaches few of them, and each object has its own. A hash collision keeps photons needlessly: that
 // costs time, but no accuracy.
 
+const float LEAST_DEMAND = 1e-30;
+
 uint demand_entry(ivec3 cell, uint of_shell, uint object) {
     uvec3 c = uvec3(cell);
     uint hash = c.x * 0x9e3779b1u ^ c.y * 0x85ebca77u ^ c.z * 0xc2b2ae3du ^ (of_shell | object << 4u) * 0x27d4eb2fu;

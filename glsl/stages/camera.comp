@@ -71,12 +71,11 @@ void main() {
     if (pixel_slot >= pixel_slots() || status.retry != 0u) {
         return;
     }
-    uvec2 pixel = pixel_of(pixel_slot);
-    bool inside = all(lessThan(pixel, settings.resolution));
+    uvec2 pixel;
+    bool inside = has_pixel(pixel_slot, pixel);
 
-    Random random =
-        random_of_pixel(CAMERA_PATH, pixel.y * settings.resolution.x + pixel.x, CameraTurn(push.iteration, push.path, push.paths),
-                        settings.seed);
+    CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
+    Random random = random_of_pixel(CAMERA_PATH, number_in_picture(pixel), turn, settings.seed);
     vec4 u = next4(random);
 
     uint slots_of_pixel = SLOTS;

@@ -150,14 +150,15 @@ void main() {
     bool has_photons = (accepted_by(receiver) | GATHERED(GatheredOf, receiver).count) != 0u;
     Coverage before = coverage[receiver];
     bool trusted = before.covered == before.samples && before.samples >= COVERAGE_TRUSTED * COVERAGE_WHOLE;
-    Random random = random_of_disc(slot, push.iteration, push.points, settings.seed);
+    uint in_whole = slot_in_whole(slot);
+    Random random = random_of_disc(in_whole, push.iteration, push.points, settings.seed);
     if (!has_photons && receiver < slots() && before.surrounded == 0u && !has_caustic_photons(slot)) {
         Random behind = random;
         behind.dimension = COVERAGE_WHOLE; // those of the disc
         bool surrounded = is_surrounded(visible_point, next4(behind).xy) && !loops_cut;
         coverage[receiver].surrounded = surrounded ? 1u : 0u;
     }
-    if (!has_photons || (trusted && (push.iteration + slot / 64u) % 8u != 0u)) {
+    if (!has_photons || (trusted && (push.iteration + in_whole / 64u) % 8u != 0u)) {
         return;
     }
     float radius = sqrt(radii2[receiver]);

@@ -2,7 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 // The demand of each visible point for photons, added to the cells that its disc reaches: the squared relative error that a
 // photon of flux 1 would cause in its pixel, times the number of visible points that such a photon reaches, up to a constant. A
-// pixel with mostly direct light has a low demand; in an empty cell, no visible point can accept a photon.
+// pixel with mostly direct light has a low demand; in an empty cell, no visible point can accept a photon. Pixels that aren't
+// guides add the least demand: their photons are kept, but nothing is learned from these.
 
 layout(local_size_x = 64) in;
 
@@ -17,6 +18,7 @@ layout(local_size_x = 64) in;
 layout(push_constant) uniform DemandPush {
     uint iterations; // done so far
     float emitted;   // photon paths of all of them
+    uint of_guides;  // 1: guides alone
 } push;
 
 uniform usamplerBuffer VisiblePoints;
@@ -52,7 +54,8 @@ void main() {
     VisiblePoint point = VISIBLE_POINT(VisiblePoints, slot);
     uint object = point.object;
     float radius2 = radii2[i];
-    if (object == NO_OBJECT) {
+    bool guide = is_guide(slot / settings.slots_per_pixel);
+    if (object == NO_OBJECT || (push.of_guides != 0u && !guide)) {
         return;
     }
     float radius = sqrt(radius2);
@@ -60,7 +63,8 @@ void main() {
     float radiance = radiance_of(slot);
     float of_one = mean_of(VISIBLE_POINT(VisiblePoints, slot).weight) / (PI * radius2);
     float reached = PI * radius2 / (footprint * footprint);
-    uint wanted = floatBitsToUint(clamp(of_one * of_one * reached / (radiance * radiance + settings.demand_floor2), 1e-30, 1e30));
+    float demanded = of_one * of_one * reached / (radiance * radiance + settings.demand_floor2);
+    uint wanted = floatBitsToUint(guide ? clamp(demanded, LEAST_DEMAND, 1e30) : LEAST_DEMAND);
 
     float reach = radius * 1.000001 + 1e-7;
     uvec2 shells = shells_of(point.position, radius);

@@ -158,7 +158,7 @@ void main() {
     if (SAMPLE_LIGHTS && has_object) {
         through_glass = samples_behind_glass(slot);
         CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
-        Random random = random_of_pixel(LIGHT_SAMPLE, slot, turn, settings.seed);
+        Random random = random_of_pixel(LIGHT_SAMPLE, slot_in_whole(slot), turn, settings.seed);
         // Not one loop for both cases: around a single sample it costs a quarter of the stage.
         if (FEW_SOURCES) {
             for (uint source = 0u; source < settings.light_source_count; source++) {

@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 #include "gather/grid.glsl"
 
 layout(push_constant) uniform GridRadiiPush {
-    uint step; // the mean is over every step-th slot
+    uint step; // the mean is over every step-th slot of guides
 } push;
 
 uniform usamplerBuffer VisiblePoints;
@@ -24,8 +24,9 @@ void main() {
     if (i >= receiver_count()) {
         return;
     }
-    VisiblePoint point = VISIBLE_POINT(VisiblePoints, i % slots());
-    if (point.object == NO_OBJECT) {
+    uint slot = i % slots();
+    VisiblePoint point = VISIBLE_POINT(VisiblePoints, slot);
+    if (point.object == NO_OBJECT || !is_guide(slot / settings.slots_per_pixel)) {
         return;
     }
     float radius2 = TEXEL(Radii2, i >> 2u)[i & 3u];

@@ -14,14 +14,22 @@ layout(local_size_x = 64) in;
 layout(std430) writeonly buffer Grid { GridShape grid; };
 layout(std430) readonly buffer RadiiOfShells { ShellRadii radii_of_shells[]; };
 
+// The radius at first at the outer end of a shell of a photon map. Its bits may not depend on the pixels that are rendered.
+float first_radius(uint of_shell) {
+    float distance = min(exp2(2.0 * float(of_shell % SHELLS) - 12.0), 4.0);
+    float footprint = settings.pixel_spread * (settings.camera_up.w != 0.0 ? 1.0 : distance);
+    float radius = sqrt(settings.initial_radius2);
+    return radius > 0.0 ? radius : settings.first_footprints[of_shell / SHELLS] * footprint;
+}
+
 void main() {
     uint i = invocation_index();
     if (i >= 2u * SHELLS) {
         return;
     }
     ShellRadii radii = radii_of_shells[i];
-    // Without visible points any size will do; small cells distribute photons evenly over the table.
-    float balanced = radii.count > 0u ? CELLS_TO_RADIUS * mean_radius(radii) : SMALLEST_CELL;
+    // A shell without guides has few visible points, with radii of about those at first.
+    float balanced = CELLS_TO_RADIUS * (radii.count > 0u ? mean_radius(radii) : first_radius(i));
     float bounded = sqrt(uintBitsToFloat(radii.largest)) / MOST_CELLS;
     float size = max(max(balanced, bounded), SMALLEST_CELL);
     grid.inverse_cell_size[i] = 1.0 / size;

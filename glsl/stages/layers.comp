@@ -71,15 +71,16 @@ void count_id(uint first, uint id) {
 
 void main() {
     uint pixel_slot = invocation_index();
-    if (pixel_slot >= pixel_slots() || status.retry != 0u) {
+    if (pixel_slot >= region_slots() || status.retry != 0u) {
         return;
     }
-    uvec2 pixel = pixel_of(pixel_slot);
-    if (any(greaterThanEqual(pixel, settings.resolution))) {
+    uvec2 pixel;
+    if (!has_pixel(pixel_slot, pixel)) {
         return;
     }
-    uint index = pixel.y * settings.resolution.x + pixel.x;
-    Random random = random_of_pixel(CAMERA_PATH, index, CameraTurn(push.iteration, push.path, push.paths), settings.seed);
+    uint index = number_on_film(pixel_slot, pixel);
+    CameraTurn turn = CameraTurn(push.iteration, push.path, push.paths);
+    Random random = random_of_pixel(CAMERA_PATH, number_in_picture(pixel), turn, settings.seed);
     vec2 u = next4(random).xy;
     vec3 origin;
     vec3 direction;

@@ -155,7 +155,7 @@ void main() {
                         }
                         if (wanted > 0.0) {
                             float flux = (landing.r + landing.g + landing.b) * (1.0 / 3.0);
-                            value = min(value + wanted * flux * flux, 1e37);
+                            value = min(value + (wanted > LEAST_DEMAND ? wanted * flux * flux : 0.0), 1e37);
                             if (stored < settings.lane_capacity) {
                                 // A partly transparent surface is seen in part as well as hit in part.
                                 vec3 flux_there = path.flux * kept_factor(met, incoming) / met.opacity;

@@ -25,8 +25,8 @@ uniform usamplerBuffer VisiblePoints;
 layout(std430) readonly buffer StatisticsOf { Statistics statistics[]; };
 layout(std430) readonly buffer CoverageOf { Coverage coverage[]; };
 layout(std430) readonly buffer DirectSums { DirectSum direct_sums[]; };
-layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left; w: see below
-layout(std430) writeonly buffer GlassFilm { BehindGlass glass_film[]; }; // likewise
+layout(std430) writeonly buffer Film { vec4 film[]; }; // row-major, from the top left, then the guides; w: see below
+layout(std430) writeonly buffer GlassFilm { BehindGlass glass_film[]; }; // likewise, without guides
 layout(std430) writeonly buffer LightPartsFilm { LightParts light_parts[]; }; // likewise
 
 // 64-bit addition with carry.
@@ -47,10 +47,11 @@ void main() {
     if (pixel_slot >= pixel_slots()) {
         return;
     }
-    uvec2 pixel = pixel_of(pixel_slot);
-    if (any(greaterThanEqual(pixel, settings.resolution))) {
+    uvec2 pixel;
+    if (!has_pixel(pixel_slot, pixel)) {
         return;
     }
+    bool on_picture = pixel_slot < region_slots();
     vec3 radiance = vec3(0.0);
     uint met = 0u;
     bool has_surface = false;
@@ -75,7 +76,9 @@ void main() {
             uint receiver = map * slots() + slot;
             Statistics mine = statistics[receiver];
             bool through_glass = map + 1u == settings.photon_maps;
-            add_accepted(mine.accepted_low, mine.accepted_high);
+            if (on_picture) {
+                add_accepted(mine.accepted_low, mine.accepted_high);
+            }
             has_photons = has_photons || (mine.accepted_low | mine.accepted_high) != 0u;
             if (mine.radius2_high > 0.0) {
                 float area = PI * mine.radius2_high * share_of(coverage[receiver]);
@@ -106,10 +109,12 @@ void main() {
     // yet.
     float alpha = float(met) / float(push.camera_paths);
     alpha = has_surface && !has_photons ? -alpha : alpha;
-    uint index = pixel.y * settings.resolution.x + pixel.x;
-    glass_film[index] = glass;
+    uint index = number_on_film(pixel_slot, pixel);
     film[index] = vec4(radiance, alpha);
-    if (LIGHT_PARTS) {
+    if (on_picture) {
+        glass_film[index] = glass;
+    }
+    if (LIGHT_PARTS && on_picture) {
         light_parts[index] = parts;
     }
 }

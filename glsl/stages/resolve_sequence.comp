@@ -17,11 +17,11 @@ layout(std430) writeonly buffer SequenceFilm { vec4 sequence_film[]; }; // row-m
 
 void main() {
     uint pixel_slot = invocation_index();
-    if (pixel_slot >= pixel_slots()) {
+    if (pixel_slot >= region_slots()) {
         return;
     }
-    uvec2 pixel = pixel_of(pixel_slot);
-    if (any(greaterThanEqual(pixel, settings.resolution))) {
+    uvec2 pixel;
+    if (!has_pixel(pixel_slot, pixel)) {
         return;
     }
     vec4 sum = vec4(0.0);
@@ -30,5 +30,5 @@ void main() {
     }
     vec4 mean = sum / float(max(push.iterations, 1u));
     bool is_sound = finite(mean.rgb) && !isnan(mean.w) && !isinf(mean.w);
-    sequence_film[pixel.y * settings.resolution.x + pixel.x] = is_sound ? mean : vec4(0.0);
+    sequence_film[number_on_film(pixel_slot, pixel)] = is_sound ? mean : vec4(0.0);
 }

@@ -108,13 +108,13 @@ pub fn cluster_picture(renderer: &mut Renderer) -> Result<Image> {
     let order: Vec<u32> = renderer.gpu().download(BufferId::PointOrder, None)?;
     let starts: Vec<u32> = renderer.gpu().download(BufferId::ClusterStarts, None)?;
     let sizes = *renderer.sizes();
-    let [width, height] = sizes.resolution.map(|side| side as usize);
+    let [width, height] = sizes.region.size.map(|side| side as usize);
     let mut pixels = vec![[0.0; 3]; width * height];
     for (cluster, &start) in starts.iter().enumerate() {
         let end = starts.get(cluster + 1).map_or(order.len(), |&next| next as usize);
         for &slot in &order[start as usize..end] {
             if slot != NO_SLOT
-                && let Some([x, y]) = pixel_of(sizes.resolution, slot / sizes.slots_per_pixel)
+                && let Some([x, y]) = pixel_of(sizes.region.size, slot / sizes.slots_per_pixel)
             {
                 pixels[y as usize * width + x as usize] = color(cluster);
             }

@@ -20,8 +20,8 @@ use super::view::{self, Address};
 use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
 use ppm_vk::{
-    Accel, Choice, Direct, EmissionChoice, Estimator, Exposure, Layer, Look, Part, PixelFilter, RenderConfig, Sampler,
-    Tone, TriangleTest,
+    Accel, Choice, Direct, EmissionChoice, Estimator, Exposure, Layer, Look, Part, PixelFilter, Region, RenderConfig,
+    Sampler, Tone, TriangleTest,
 };
 
 /// Maximum shift of the film, in units of the picture's larger side.
@@ -145,6 +145,10 @@ pub struct RenderArguments {
     /// Pixels [default: 1280 wide at the camera's aspect ratio].
     #[arg(long, value_name = "WxH", value_parser = resolution)]
     pub resolution: Option<[u32; 2]>,
+    /// Render a part of the picture, from the pixel X,Y (0,0: upper left), with the same bits as in the whole. The EXR's data window
+    /// tells its place.
+    #[arg(long, value_name = "X,Y,WxH", value_parser = crop)]
+    pub crop: Option<Region>,
     /// Camera, by name or index [default: the scene's first].
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
@@ -302,6 +306,19 @@ fn part(text: &str) -> Result<Part, String> {
         .and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
     let (number, of) = parsed.ok_or("expected K/N, such as 1/4")?;
     ranges::part(Part { number, of })
+}
+
+fn crop(text: &str) -> Result<Region, String> {
+    let mut parts = text.splitn(3, ',');
+    let mut next = || parts.next().map(str::trim);
+    let parsed = (|| {
+        let origin = [next()?.parse().ok()?, next()?.parse().ok()?];
+        Some(Region {
+            origin,
+            size: resolution(next()?).ok()?,
+        })
+    })();
+    parsed.ok_or_else(|| "expected X,Y,WIDTHxHEIGHT, such as 320,180,640x360".to_owned())
 }
 
 fn shift(text: &str) -> Result<[f32; 2], String> {

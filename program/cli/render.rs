@@ -298,6 +298,8 @@ fn choose_platform(arguments: &RenderArguments) -> (Platform, usize) {
         Some("--backend cpu has the layers samples and error alone")
     } else if arguments.aov.iter().any(|layer| layer.needs_device()) && !arguments.part.is_whole() {
         Some("parts have no layers but samples and error: ppm-vk merge would leave them out")
+    } else if backend == BackendChoice::Cpu && arguments.crop.is_some() {
+        Some("--backend cpu renders whole pictures: it has no --crop")
     } else if backend == BackendChoice::Cpu && arguments.device.is_some() {
         Some("the CPU backend has no --device")
     } else {
@@ -316,6 +318,7 @@ fn choose_platform(arguments: &RenderArguments) -> (Platform, usize) {
 fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> RenderConfig {
     RenderConfig {
         resolution: arguments.resolution.unwrap_or(RenderConfig::of(camera).resolution),
+        crop: arguments.crop,
         photons: arguments.photons,
         estimator: arguments.estimator,
         direct: arguments.direct,

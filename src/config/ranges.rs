@@ -1,7 +1,7 @@
 //! Ranges of settings, for arguments and for [`RenderConfig::check`](super::RenderConfig::check). Each function returns the
 //! value, or a text that says what it must be.
 
-use super::{MAX_SIDE, Part};
+use super::{MAX_SIDE, Part, Region};
 
 /// The value, or what it must be.
 pub type Checked<T> = Result<T, String>;
@@ -14,6 +14,16 @@ fn checked<T>(value: T, fits: bool, range: impl FnOnce() -> String) -> Checked<T
 pub fn resolution(sides: [u32; 2]) -> Checked<[u32; 2]> {
     let fits = sides.iter().all(|side| (1..=MAX_SIDE).contains(side));
     checked(sides, fits, || format!("each side must lie between 1 and {MAX_SIDE}"))
+}
+
+/// A part of a picture of this size.
+pub fn crop(crop: Region, [width, height]: [u32; 2]) -> Checked<Region> {
+    let fits = |axis: usize, side: u32| {
+        crop.size[axis] > 0 && u64::from(crop.origin[axis]) + u64::from(crop.size[axis]) <= u64::from(side)
+    };
+    checked(crop, fits(0, width) && fits(1, height), || {
+        format!("must have at least one pixel, and lie within the picture of {width}x{height}")
+    })
 }
 
 /// A count of at least one.

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use exr::image::write::WritableImage;
 use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Layer};
 use exr::math::Vec2;
-use exr::meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text};
+use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
 use exr::meta::header::LayerAttributes;
 use exr::prelude::SmallVec;
 use std::collections::HashMap;
@@ -86,6 +86,8 @@ pub struct Additions<'a> {
     pub attributes: Vec<(String, String)>,
     /// How channels are named.
     pub view_layer: ViewLayer<'a>,
+    /// The first pixel's place in a whole picture, and that one's size; `None` if the image is the whole.
+    pub place: Option<([u32; 2], [u32; 2])>,
 }
 
 /// The samples of an image's three components.
@@ -148,6 +150,10 @@ pub fn write_exr(image: &Image, additions: Additions<'_>, path: &Path, metadata:
     let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let mut picture = exr::image::Image::from_layer(layer);
     picture.attributes.chromaticities = Some(REC_709);
+    if let Some(([x, y], [width, height])) = additions.place {
+        picture.layer_data.attributes.layer_position = Vec2(x as i32, y as i32);
+        picture.attributes.display_window = IntegerBounds::from_dimensions((width as usize, height as usize));
+    }
 
     let mut file = Vec::new();
     picture

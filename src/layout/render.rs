@@ -8,7 +8,7 @@ use super::shape::{FieldLayout, Layout, Shared};
 
 device_structs! {
     /// Constants of a render. Lengths in render units.
-    pub struct Settings: 448 {
+    pub struct Settings: 464 {
         /// xyz: centre of projection; w: radius of the lens.
         pub camera_position: [f32; 4],
         /// xyz: to the picture's right edge, at distance 1; w: focal distance along the direction of view.
@@ -61,12 +61,14 @@ device_structs! {
         pub near_light_count: u32,
         /// Number of [`super::LightSource`]s.
         pub light_source_count: u32,
-        /// Zero.
-        pub padding0: u32,
-        /// Zero.
-        pub padding1: u32,
-        /// Zero.
-        pub padding2: u32,
+        /// Pixels between neighbouring guides, see [`crate::config::Guides`].
+        pub guide_step: u32,
+        /// Guides in a row, and rows of guides; 0 if all pixels are guides.
+        pub guides: [u32; 2],
+        /// The first pixel that is rendered.
+        pub region_origin: [u32; 2],
+        /// Pixels that are rendered, width and height.
+        pub region_size: [u32; 2],
         /// The media that the camera is in, sorted; 2³² − 1 in unused entries.
         pub camera_media: [u32; 4],
         /// Distances from a pixel's centre, in pixels: `PixelFilter::places`.

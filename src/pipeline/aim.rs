@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::film::Image;
 use crate::layout::VisiblePoint;
 use crate::packing::PackedScene;
+use crate::sizes::Sizes;
 use crate::stage::BufferId;
 
 impl Renderer {
@@ -24,7 +25,8 @@ impl Renderer {
         }
         let visible_points: Vec<VisiblePoint> = self.device.download(BufferId::VisiblePoints, None)?;
         let config = self.config.clone();
-        let aim = Aim::by_pilots(&config, scene, &visible_points, |table, iteration| {
+        let guides = &visible_points[self.sizes.guide_slots()];
+        let aim = Aim::by_pilots(&config, scene, guides, |table, iteration| {
             self.upload_table(table)?;
             self.run_until_it_fits(|stages| {
                 let mut recording = reporting();
@@ -51,7 +53,7 @@ impl Renderer {
             let recording = self.stages().film(self.figures.totals);
             self.run(&recording)?;
             let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
-            self.settings.demand_floor2 = demand_floor2(&Image::from_film(self.config.resolution, &film));
+            self.settings.demand_floor2 = demand_floor2(&self.seen_by_guides(&film));
             self.upload_settings()?;
         }
         let Some(mut aim) = self.aim.take() else { return Ok(()) };
@@ -59,6 +61,19 @@ impl Renderer {
         self.upload_table(aim.table())?;
         self.aim = Some(aim);
         Ok(())
+    }
+
+    /// The picture of the guides alone.
+    fn seen_by_guides(&self, film: &[[f32; 4]]) -> Image {
+        let Sizes { region, guides, .. } = self.sizes;
+        if guides.slots() == 0 {
+            return Image::from_film(region.size, film);
+        }
+        let of_guides = (0..).zip(&film[region.pixels() as usize..]);
+        let seen: Vec<[f32; 4]> = of_guides
+            .filter_map(|(slot, &pixel)| guides.has(slot).then_some(pixel))
+            .collect();
+        Image::from_film([seen.len() as u32, 1], &seen)
     }
 
     /// Learns from the values of an iteration's first paths.

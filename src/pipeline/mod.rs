@@ -21,7 +21,7 @@ use crate::emission::Aim;
 use crate::error::{Error, Result, Setting};
 use crate::gather::{METHODS, default_method, grid_sizes};
 use crate::gpu::{Device, DeviceSummary, no_ray_query};
-use crate::layout::{Settings, StatusCounters};
+use crate::layout::{BehindGlass, IDS_OF_PIXEL, IdCount, LightParts, Settings, StatusCounters, SurfaceSum};
 use crate::packing::{IN_VACUUM, PackedScene, SceneFeatures};
 use crate::random::CameraTurn;
 use crate::record::{Recording, Run};
@@ -219,19 +219,27 @@ impl Renderer {
         self.figures.counters.non_finite += u64::from(status.non_finite);
         self.figures.counters.photons_accepted = status.photons_accepted();
         let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
-        let behind_glass = self.device.download(BufferId::GlassFilm, None)?;
+        let behind_glass: Vec<BehindGlass> = self.device.download(BufferId::GlassFilm, None)?;
         let mut sequences = Vec::new();
         for film in SEQUENCE_FILMS {
             sequences.extend(self.device.download::<[f32; 4]>(film, None)?);
         }
-        let mut resolved = Resolved::from_film(self.config.resolution, &film, behind_glass, sequences);
+        let (region, shown) = (self.sizes.region, self.config.shown());
+        let pixels = region.pixels() as usize;
+        let sequences = sequences.chunks_exact(pixels);
+        let sequences = sequences.flat_map(|film| region.cut(&shown, film)).collect();
+        let film = region.cut(&shown, &film[..pixels]);
+        let mut resolved = Resolved::from_film(shown.size, &film, region.cut(&shown, &behind_glass), sequences);
         let layers = self.config.layers;
         if layers.show_surfaces() {
-            resolved.layers.surfaces = self.device.download(BufferId::SurfaceSums, None)?;
-            resolved.layers.ids = self.device.download(BufferId::IdCounts, None)?;
+            let surfaces: Vec<SurfaceSum> = self.device.download(BufferId::SurfaceSums, None)?;
+            resolved.layers.surfaces = region.cut(&shown, &surfaces);
+            let ids: Vec<[IdCount; 2 * IDS_OF_PIXEL as usize]> = self.device.download(BufferId::IdCounts, None)?;
+            resolved.layers.ids = region.cut(&shown, &ids).into_flattened();
         }
         if layers.show_light() {
-            resolved.layers.light = self.device.download(BufferId::LightPartsFilm, None)?;
+            let light: Vec<LightParts> = self.device.download(BufferId::LightPartsFilm, None)?;
+            resolved.layers.light = region.cut(&shown, &light);
         }
         Ok((run, resolved))
     }

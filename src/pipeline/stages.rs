@@ -108,7 +108,7 @@ impl Stages<'_> {
         // After the photons, because an iteration that has to be repeated must stop before it adds anything.
         if self.config.layers.show_surfaces() && self.config.finds_visible_points(iteration) {
             recording.dispatch(
-                self.ray_stage(&shaders::LAYERS, self.sizes.pixel_slots)
+                self.ray_stage(&shaders::LAYERS, self.sizes.region_slots)
                     .push(shaders::CameraTurnPush::from(turn)),
             );
         }
@@ -145,7 +145,7 @@ impl Stages<'_> {
         let iterations = totals.at_least_one().iterations;
         for (sequence, (sums, film)) in (0..).zip(SEQUENCE_SUMS.into_iter().zip(SEQUENCE_FILMS)) {
             recording.dispatch(
-                StageDesc::new(&shaders::RESOLVE_SEQUENCE, self.sizes.pixel_slots)
+                StageDesc::new(&shaders::RESOLVE_SEQUENCE, self.sizes.region_slots)
                     .push(shaders::ResolveSequencePush {
                         iterations: iterations_of(sequence, iterations),
                     })
@@ -186,11 +186,21 @@ impl Stages<'_> {
 
     /// The demand of the visible points, after this number of iterations. The paper keeps all photons.
     pub(super) fn demand(&self, iterations: u32, recording: &mut Recording) {
+        self.demand_of(false, iterations, recording);
+    }
+
+    /// The demand of guides alone.
+    pub(super) fn demand_of_guides(&self, recording: &mut Recording) {
+        self.demand_of(true, 0, recording);
+    }
+
+    fn demand_of(&self, guides: bool, iterations: u32, recording: &mut Recording) {
         if self.config.drops_unwanted() {
             let emitted = u64::from(iterations) * u64::from(self.config.photons);
             let push = shaders::DemandPush {
                 iterations,
                 emitted: emitted as f32,
+                of_guides: u32::from(guides),
             };
             recording.fill(BufferId::Demand, 0);
             recording.dispatch(StageDesc::new(&shaders::DEMAND, self.sizes.receivers()).push(push));

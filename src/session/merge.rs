@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::state::{Identity, State};
 use super::{Rendered, rendered::Of};
 use crate::backend::{Counters, DeviceDescription, Resolved};
-use crate::config::{Layers, SEQUENCES, SequenceIterations, Totals};
+use crate::config::{Layers, Region, SEQUENCES, SequenceIterations, Totals};
 use crate::error::{Error, Result};
 use crate::estimate::ErrorEstimate;
 use crate::film::Metadata;
@@ -53,6 +53,7 @@ struct Share {
     seed: u32,
     max_depth: u32,
     resolution: [u32; 2],
+    shown: Region,
 }
 
 /// Adds a picture to the state of one of several parts.
@@ -70,6 +71,7 @@ pub(super) fn put_picture(blocks: &mut Blocks, about: &super::rendered::About, m
         seed: config.seed,
         max_depth: config.max_depth,
         resolution: config.resolution,
+        shown: config.shown(),
     };
     blocks.put(SHARE, &share)?;
     let picture = made.picture;
@@ -113,8 +115,7 @@ impl Merge {
             return Err(Error::Config("is a state of a whole render, not of a part".to_owned()));
         }
         let shares = shares_of(state)?;
-        let [width, height] = shares.values().next().map_or([0, 0], |share| share.resolution);
-        let pixels = width as usize * height as usize;
+        let pixels = shares.values().next().map_or(0, |share| share.shown.pixels()) as usize;
         let mut merge = Self {
             of: state.of.merged(),
             shares: BTreeMap::new(),
@@ -261,12 +262,14 @@ impl Merge {
             iterations,
             picture: picture.into(),
             layers: Layers::NONE,
+            shown: first.shown,
+            resolution: first.resolution,
             names: Arc::default(),
             samples: totals.camera_paths,
             estimate,
             subject: Subject {
                 scene: first.scene.clone(),
-                resolution: first.resolution,
+                resolution: first.shown.size,
                 gather: first.gather.clone(),
                 photons: first.photons,
                 photons_emitted: totals.emitted,
@@ -306,8 +309,8 @@ impl Merge {
             self.sums.iter().map(of_pixel)
         };
         let sequences = of_sequences.into_iter().enumerate().flat_map(of_sequence);
-        let [width, height] = self.shares.values().next().map_or([0, 0], |share| share.resolution);
-        Resolved::from_film([width, height], &film, glass.collect(), sequences.collect())
+        let size = self.shares.values().next().map_or([0, 0], |share| share.shown.size);
+        Resolved::from_film(size, &film, glass.collect(), sequences.collect())
     }
 }
 

@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 use crate::backend::{Backend, DeviceDescription, Phase};
 use crate::config::{MAX_SIDE, RenderConfig};
-use crate::error::Result;
+use crate::error::{Error, Result, Setting};
 use crate::estimate::{ErrorEstimate, RelativeError, of_one_photon};
 use crate::film::Image;
 use crate::gather::{METHODS, default_cpu_method, default_method};
@@ -151,6 +151,10 @@ impl Session {
                 )?))
             }
             Platform::Cpu => {
+                if let Some(crop) = config.crop {
+                    let what = format!("{crop}: the CPU backend renders whole pictures");
+                    return Err(Error::setting(Setting::Crop, what));
+                }
                 begins(Phase::Pilot);
                 Renderer::Cpu(Box::new(cpu::Renderer::new(packed, camera, config.clone())?))
             }

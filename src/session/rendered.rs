@@ -10,7 +10,7 @@ use super::layers::{LayersOf, SceneNames};
 use super::state::Identity;
 use super::work::Done;
 use crate::backend::{DeviceDescription, Resolved};
-use crate::config::{Layers, RenderConfig, SequenceIterations};
+use crate::config::{Layers, Region, RenderConfig, SequenceIterations};
 use crate::denoise::{self, Denoiser};
 use crate::error::{Error, Result};
 #[cfg(test)]
@@ -83,6 +83,9 @@ impl About {
 pub(super) struct Of {
     pub picture: Arc<Resolved>,
     pub layers: Layers,
+    /// What it shows of a picture of this size.
+    pub shown: Region,
+    pub resolution: [u32; 2],
     pub names: Arc<SceneNames>,
     /// Without the error.
     pub metadata: Metadata,
@@ -123,7 +126,7 @@ impl Rendered {
     pub(super) fn new(about: &About, done: Done) -> Self {
         let subject = Subject {
             scene: about.scene.clone(),
-            resolution: about.config.resolution,
+            resolution: about.config.shown().size,
             gather: about.gather.to_owned(),
             photons: about.config.photons,
             photons_emitted: done.emitted,
@@ -143,6 +146,8 @@ impl Rendered {
             iterations: done.iterations.into(),
             picture: done.picture,
             layers: about.config.layers,
+            shown: about.config.shown(),
+            resolution: about.config.resolution,
             names: about.names.clone(),
             samples: about.config.camera_paths() * done.iterations,
             estimate: about.estimate,
@@ -270,6 +275,7 @@ impl Rendered {
             channels,
             attributes,
             view_layer,
+            place: Some((self.of.shown.origin, self.of.resolution)),
         };
         let metadata = Metadata {
             estimated_error: self.error().map(|error| error.total),

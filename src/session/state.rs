@@ -101,6 +101,7 @@ fn named(config: &RenderConfig) -> BTreeMap<String, String> {
     // Every field: one that is added has to be considered here.
     let RenderConfig {
         resolution: [width, height],
+        crop,
         photons,
         estimator,
         direct,
@@ -123,6 +124,7 @@ fn named(config: &RenderConfig) -> BTreeMap<String, String> {
     let or_automatic = |value: Option<String>| value.unwrap_or_else(|| "automatic".to_owned());
     let settings = [
         ("resolution", format!("{width}x{height}")),
+        ("crop", crop.map_or("none".to_owned(), |crop| crop.to_string())),
         ("photons", photons.to_string()),
         ("estimator", estimator.to_string()),
         ("direct", direct.to_string()),

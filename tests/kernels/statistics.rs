@@ -280,6 +280,7 @@ fn cells_want_photons_as_the_visible_points_do_that_reach_them() {
         let push = shaders::DemandPush {
             iterations,
             emitted: emitted as f32,
+            of_guides: 0,
         };
         recording.dispatch(StageDesc::new(&shaders::DEMAND, receivers).push(push));
         bench.renderer.run(&recording).expect("demand");
