@@ -13,7 +13,7 @@ pub(crate) use choice::choices;
 pub use filter::PixelFilter;
 pub use layers::{Layer, Layers};
 pub use part::Part;
-pub use region::{Guides, Region};
+pub use region::{GuidePixels, Region};
 pub use tiles::pixel_of;
 
 use std::fmt::Display;

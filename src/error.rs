@@ -175,6 +175,15 @@ impl Error {
         matches!(self, Self::Vulkan { code, .. } if code.contains("DEVICE_LOST"))
     }
 
+    /// Whether a device can't render the picture at once, but can render a smaller one, or [crops](crate::crops) of it.
+    pub fn is_picture_too_large(&self) -> bool {
+        let remedy = match self {
+            Self::Unfit { remedy, .. } => Some(remedy),
+            _ => None,
+        };
+        matches!(remedy, Some(Remedy::Resolution(_)))
+    }
+
     /// A device whose limits are exceeded.
     pub(crate) fn unfit(what: impl Into<String>, remedy: Remedy) -> Self {
         Self::Unfit {

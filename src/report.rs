@@ -113,6 +113,13 @@ impl Profile {
         self.runs.push(run);
     }
 
+    /// Adds the iterations of a render that followed.
+    pub fn append(&mut self, other: Self) {
+        let before = self.begins.last().copied().unwrap_or_default();
+        self.begins.extend(other.begins.into_iter().map(|begin| before + begin));
+        self.runs.extend(other.runs);
+    }
+
     /// Wall-clock time from each submission to its end, summed.
     pub fn wall(&self) -> Duration {
         self.runs.iter().map(|run| run.wall).sum()

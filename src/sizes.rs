@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use std::ops::Range;
 
-use crate::config::{EmissionChoice, Estimator, Guides, Layers, Region, RenderConfig};
+use crate::config::{EmissionChoice, Estimator, GuidePixels, Layers, Region, RenderConfig};
 use crate::layout::{
     BehindGlass, Centroid, Coverage, DEMAND_BITS, DirectSum, EmissionCell, GROUP, Gathered, GridShape, IDS_OF_PIXEL,
     IdCount, LightParts, PathStart, Photon, SCAN_BLOCK, SHELLS, SORT_TILE, ShellRadii, Statistics, StatusCounters,
@@ -47,7 +47,7 @@ pub struct Sizes {
     /// Slots for them.
     pub region_slots: u32,
     /// The guides, which are rendered in addition.
-    pub guides: Guides,
+    pub guides: GuidePixels,
     /// Slots for all of these.
     pub pixel_slots: u32,
     /// Visible points a pixel.
@@ -319,7 +319,7 @@ impl Sizes {
         self.slots() * self.photon_maps
     }
 
-    /// Step between the receivers whose radii are averaged for a grid: odd, so that it includes all slots of a pixel. Guides
+    /// Step between the receivers whose radii are averaged for a grid: odd, so that it includes all slots of a pixel. GuidePixels
     /// that are rendered in addition are few.
     pub fn radius_step(&self) -> u32 {
         if self.guides.slots() > 0 {

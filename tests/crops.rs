@@ -31,7 +31,11 @@ impl File {
         arguments.extend(more);
         let output = ppm_vk(folder, &arguments);
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
-        let image = read_first_flat_layer_from_file(folder.join(name)).expect("a picture");
+        Self::read(&folder.join(name))
+    }
+
+    fn read(path: &Path) -> Self {
+        let image = read_first_flat_layer_from_file(path).expect("a picture");
         let layer = image.layer_data;
         let side = |side: i32| side as usize;
         let position = layer.attributes.layer_position;
@@ -132,4 +136,36 @@ fn a_crop_outside_of_the_picture_is_refused() {
     }
     let files = folder.path().read_dir().expect("a folder").count();
     assert_eq!(files, 0, "no picture is written");
+}
+
+/// 7680×4320 pixels on a device that binds 128 MiB, such as lavapipe; at once on one that binds more.
+#[test]
+#[ignore = "renders 33 million pixels"]
+fn a_picture_larger_than_a_devices_buffers_is_rendered_in_crops() {
+    let folder = TempDir::new().expect("folder");
+    let folder = folder.path();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-spheres.gltf");
+    let file = |name: &str, more: &[&str]| {
+        let mut arguments = vec!["--scene", scene, "-o", name, "--resolution", "7680x4320"];
+        arguments.extend(["--iterations", "1", "--photons", "20000"]);
+        let output = ppm_vk(folder, &[&arguments, more].concat());
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(0), "{more:?}: {text}");
+        (File::read(&folder.join(name)), text)
+    };
+    let (whole, text) = file("whole.exr", &[]);
+    println!("{text}");
+    assert_eq!((whole.origin, whole.size), ([0, 0], [7680, 4320]));
+    let alpha = &whole.channels["A"];
+    let seen = alpha.iter().filter(|&&alpha| alpha > 0.0).count();
+    // The box is as high as wide, and fills the picture's height.
+    assert!(seen > 4000 * 4000, "{seen} pixels show a surface");
+    let (part, _) = file("part.exr", &["--crop", "3600,2000,400x300"]);
+    assert!(part.channels["A"].contains(&1.0));
+    for channel in ["R", "G", "B", "A"] {
+        for y in part.origin[1]..part.origin[1] + part.size[1] {
+            let rows = [&part, &whole].map(|file| file.row(channel, [part.origin[0], y], part.size[0]));
+            assert!(rows[0] == rows[1], "{channel}, row {y}: pixels of the crop differ");
+        }
+    }
 }

@@ -15,6 +15,7 @@ mod args;
 mod bench;
 mod compare;
 mod converge;
+mod crops;
 mod denoise;
 mod events;
 mod interrupt;

@@ -48,13 +48,13 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
 }
 
 /// A render of a scene's file.
-struct Job<'a> {
-    arguments: &'a RenderArguments,
+pub(super) struct Job<'a> {
+    pub arguments: &'a RenderArguments,
     path: &'a Path,
-    output: &'a Path,
-    platform: Platform,
+    pub output: &'a Path,
+    pub platform: Platform,
     gather: usize,
-    watch: &'a Watch<'a>,
+    pub watch: &'a Watch<'a>,
 }
 
 impl Job<'_> {
@@ -93,7 +93,10 @@ impl Job<'_> {
             _ => {}
         };
         let open = || Session::watched(&prepared, &camera, &config, platform, &begins);
-        let mut session = open()?;
+        let mut session = match open() {
+            Err(error) if error.is_picture_too_large() => return self.in_crops(&prepared, &camera, &config, error),
+            session => session?,
+        };
         tell_warnings(events, session.warnings());
         if let Some(state) = &arguments.state {
             begin_with_state(events, &mut session, state, arguments.resume)?;
@@ -167,7 +170,7 @@ fn camera(arguments: &RenderArguments, scene: &Scene) -> Result<Camera> {
     Ok(camera)
 }
 
-fn until(arguments: &RenderArguments) -> Until {
+pub(super) fn until(arguments: &RenderArguments) -> Until {
     let endless = arguments.time.is_none() && arguments.target_error.is_none();
     Until {
         iterations: arguments.iterations.or_else(|| endless.then_some(DEFAULT_ITERATIONS)),
@@ -201,7 +204,12 @@ fn is_device_lost(rendered: &ppm_vk::Result<Rendered>) -> bool {
 ///
 /// # Errors
 /// All failures, including that of the render, in one line.
-fn write_outputs(arguments: &RenderArguments, events: &Events, output: &Path, rendered: &Rendered) -> Result<()> {
+pub(super) fn write_outputs(
+    arguments: &RenderArguments,
+    events: &Events,
+    output: &Path,
+    rendered: &Rendered,
+) -> Result<()> {
     let _writing = Writing::begin();
     let iterations = rendered.iterations();
     let pictures = arguments
@@ -238,7 +246,7 @@ fn print_profile(arguments: &RenderArguments, rendered: &Rendered) -> Result<()>
     Ok(())
 }
 
-fn tell_warnings(events: &Events, warnings: &[Warning]) {
+pub(super) fn tell_warnings(events: &Events, warnings: &[Warning]) {
     for warning in warnings {
         let text = advice::of_warning(warning);
         if warning.is_slight() {

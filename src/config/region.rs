@@ -41,6 +41,35 @@ impl Region {
         rows.flat_map(|row| &row[x..x + width]).cloned().collect()
     }
 
+    /// Replaces in `all`, of this region, what belongs to `inner`, which lies within; `each` values a pixel.
+    pub fn paste<T: Copy>(&self, inner: &Self, values: &[T], all: &mut [T], each: usize) {
+        let [x, y] = [0, 1].map(|axis| (inner.origin[axis] - self.origin[axis]) as usize);
+        let [row, length] = [self, inner].map(|region| region.size[0] as usize * each);
+        let rows = all.chunks_exact_mut(row).skip(y);
+        for (row, values) in rows.zip(values.chunks_exact(length)) {
+            row[x * each..][..length].copy_from_slice(values);
+        }
+    }
+
+    /// Crops of at most `side` pixels in width and height that cover it, row by row, of similar size.
+    pub fn crops(&self, side: u32) -> Vec<Self> {
+        let [columns, rows] = [0, 1].map(|axis| {
+            let count = self.size[axis].div_ceil(side);
+            let step = self.size[axis].div_ceil(count);
+            (0..count).map(move |number| {
+                let low = number * step;
+                (self.origin[axis] + low, step.min(self.size[axis] - low))
+            })
+        });
+        let row = |(y, height): (u32, u32)| {
+            columns.clone().map(move |(x, width)| Self {
+                origin: [x, y],
+                size: [width, height],
+            })
+        };
+        rows.flat_map(row).collect()
+    }
+
     /// With `margin` more pixels on each side, and from a tile's first pixel on, within a picture of this size.
     fn widened(&self, margin: u32, resolution: [u32; 2]) -> Self {
         let low = self.origin.map(|low| low.saturating_sub(margin) / TILE * TILE);
@@ -74,14 +103,14 @@ const MARGIN: u32 = 40;
 /// the whole picture evenly, also if a part of it is rendered, so that a crop has the bits of the whole. A small picture's guides
 /// are all of its pixels. Those of a larger one are rendered in addition, into slots of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-pub struct Guides {
+pub struct GuidePixels {
     /// Pixels between neighbours.
     pub step: u32,
-    /// Guides in a row, and rows; 0 if all pixels are guides.
+    /// GuidePixels in a row, and rows; 0 if all pixels are guides.
     pub size: [u32; 2],
 }
 
-impl Guides {
+impl GuidePixels {
     fn of([width, height]: [u32; 2]) -> Self {
         let size = |step: u32| [width.div_euclid(step).max(1), height.div_euclid(step).max(1)];
         let fits = |step: &u32| size(*step).into_iter().product::<u32>() <= MOST_GUIDES;
@@ -94,7 +123,7 @@ impl Guides {
         Region::whole(self.size).slots()
     }
 
-    /// Whether one of [`Guides::slots`] has a pixel.
+    /// Whether one of [`GuidePixels::slots`] has a pixel.
     pub fn has(&self, slot: u32) -> bool {
         pixel_of(self.size, slot).is_some()
     }
@@ -120,11 +149,11 @@ impl RenderConfig {
     }
 
     /// The guides; without size if all pixels are guides.
-    pub fn guides(&self) -> Guides {
+    pub fn guides(&self) -> GuidePixels {
         if self.is_guided_by_all() {
-            Guides::default()
+            GuidePixels::default()
         } else {
-            Guides::of(self.resolution)
+            GuidePixels::of(self.resolution)
         }
     }
 }
@@ -136,7 +165,7 @@ mod tests {
     #[test]
     fn guides_cover_a_large_picture_evenly_and_are_few() {
         for resolution in [[1280, 720], [16384, 16384], [16384, 5], [7680, 4320], [257, 256]] {
-            let Guides { step, size } = Guides::of(resolution);
+            let GuidePixels { step, size } = GuidePixels::of(resolution);
             assert!(size[0] * size[1] <= MOST_GUIDES, "{resolution:?}: {size:?}");
             assert!(size[0] * size[1] > MOST_GUIDES / 4, "{resolution:?}: {size:?}");
             for axis in 0..2 {
@@ -149,6 +178,22 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn crops_cover_a_region_once() {
+        let region = Region {
+            origin: [3, 5],
+            size: [101, 47],
+        };
+        let mut covered = vec![0; 101 * 47];
+        for crop in region.crops(20) {
+            assert!(crop.size.iter().all(|&side| (1..=20).contains(&side)), "{crop}");
+            let ones: Vec<i32> = region.cut(&crop, &covered).iter().map(|count| count + 1).collect();
+            region.paste(&crop, &ones, &mut covered, 1);
+        }
+        assert!(covered.iter().all(|&count| count == 1), "{covered:?}");
+        assert_eq!(region.crops(200), [region]);
     }
 
     #[test]

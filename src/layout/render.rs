@@ -61,9 +61,9 @@ device_structs! {
         pub near_light_count: u32,
         /// Number of [`super::LightSource`]s.
         pub light_source_count: u32,
-        /// Pixels between neighbouring guides, see [`crate::config::Guides`].
+        /// Pixels between neighbouring guides, see [`crate::config::GuidePixels`].
         pub guide_step: u32,
-        /// Guides in a row, and rows of guides; 0 if all pixels are guides.
+        /// GuidePixels in a row, and rows of guides; 0 if all pixels are guides.
         pub guides: [u32; 2],
         /// The first pixel that is rendered.
         pub region_origin: [u32; 2],

@@ -31,6 +31,13 @@ pub(crate) fn floor_of(reference: &Image) -> f64 {
     REL_MSE_FLOOR * (mean(reference).iter().sum::<f64>() / 3.0).powi(2)
 }
 
+/// relMSE of an image with these errors, root of the mean square of each pixel, relative to itself.
+pub fn relative2(image: &Image, errors: &Image, floor: f64) -> f64 {
+    let values = image.pixels().iter().flatten().zip(errors.pixels().iter().flatten());
+    let squares = values.map(|(&value, &error)| f64::from(error).powi(2) / (f64::from(value).powi(2) + floor));
+    squares.sum::<f64>() / (3 * image.pixels().len()) as f64
+}
+
 /// A value's contribution to relMSE.
 fn relative_square(x: f64, r: f64, floor: f64) -> f64 {
     (x - r).powi(2) / (r * r + floor)

@@ -3,9 +3,11 @@
 
 use std::collections::BTreeMap;
 
+use super::accel_on;
+use super::memory::limits;
 use super::memory::scene_buffers;
 use super::stages::Stages;
-use crate::config::{RenderConfig, Totals};
+use crate::config::{Region, RenderConfig, Totals};
 use crate::error::{Error, Remedy, Result, Setting};
 use crate::gpu::{Device, DeviceSummary, StructureBytes, remedy};
 use crate::packing::PackedScene;
@@ -13,6 +15,9 @@ use crate::record::{Command, Recording};
 use crate::sizes::{Limits, Sizes};
 use crate::stage::{Access, BufferId};
 use crate::text;
+
+/// Minimum side of a crop that is chosen, in pixels: the margin around it and the guides would cost more than the crop.
+const SMALLEST_CROP: u32 = 128;
 
 /// Builds the acceleration structures of a scene.
 ///
@@ -80,6 +85,41 @@ pub(super) fn check_fits(
     ))
 }
 
+/// The crops of what is shown of a picture that a device can render, one if it can render that at once.
+///
+/// # Errors
+/// As [`check_fits`], if it can render none.
+pub fn crops(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary) -> Result<Vec<Region>> {
+    let config = &RenderConfig {
+        accel: accel_on(config, device)?,
+        ..config.clone()
+    };
+    let limits = limits(device, u32::MAX, scene);
+    let shown = config.shown();
+    let with = |crop: Region| RenderConfig {
+        crop: Some(crop),
+        ..config.clone()
+    };
+    if too_large(scene, config, device, limits).is_none() {
+        return Ok(vec![shown]);
+    }
+    let maps = |crop: Region| Sizes::new(&with(crop), limits).photon_maps;
+    let small = Region { size: [1, 1], ..shown };
+    // All crops of a picture have the same photon maps, however large they are.
+    let fits = |crops: &Vec<Region>| {
+        let fits =
+            |&crop: &Region| maps(crop) == maps(small) && too_large(scene, &with(crop), device, limits).is_none();
+        crops.iter().all(fits)
+    };
+    let largest = shown.size[0].max(shown.size[1]);
+    let sides = (0..64).map(|step| (f64::from(largest) * 0.9_f64.powi(step)) as u32);
+    let sides = sides.take_while(|&side| side >= SMALLEST_CROP.min(largest));
+    match sides.map(|side| shown.crops(side)).find(fits) {
+        Some(crops) => Ok(crops),
+        None => check_fits(scene, config, device, limits).map(|()| vec![shown]),
+    }
+}
+
 fn too_large(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary, limits: Limits) -> Option<TooLarge> {
     let sizes = Sizes::new(config, limits);
     let stages = Stages {
@@ -126,7 +166,6 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::pipeline::memory::limits;
     use crate::scene::Scene;
 
     fn device(max_texels: u32, max_allocation_bytes: u64) -> DeviceSummary {
@@ -191,6 +230,37 @@ mod tests {
         let error = check("cornell", [640, 480], &small).expect_err("1 MiB is too little");
         assert!(error.to_string().contains("allocates 1.0 MiB at once"), "{error}");
         check("cornell", advised(&error), &small).unwrap_or_else(|error| panic!("what was advised: {error}"));
+    }
+
+    #[test]
+    fn a_picture_that_is_too_large_is_cut_into_crops_that_fit() {
+        let small = device(1 << 20, 1 << 30);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-spheres.gltf");
+        let scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
+        let scene = PackedScene::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+        let of = |resolution| RenderConfig {
+            resolution,
+            ..RenderConfig::default()
+        };
+        let found = crops(&scene, &of([640, 480]), &small).expect("a picture that fits");
+        assert_eq!(found, [Region::whole([640, 480])]);
+        let config = of([7680, 4320]);
+        let found = crops(&scene, &config, &small).expect("crops");
+        assert!((50..500).contains(&found.len()), "{} crops", found.len());
+        let pixels: u64 = found.iter().map(Region::pixels).sum();
+        assert_eq!(pixels, config.shown().pixels());
+        let limits = limits(&small, u32::MAX, &scene);
+        for crop in found {
+            let config = RenderConfig {
+                crop: Some(crop),
+                ..config.clone()
+            };
+            check_fits(&scene, &config, &small, limits).unwrap_or_else(|error| panic!("{crop}: {error}"));
+            assert_eq!(Sizes::new(&config, limits).photon_maps, 2, "{crop}: photon maps");
+        }
+        let tiny = device(16, 1 << 30);
+        let error = crops(&scene, &config, &tiny).expect_err("no crop fits");
+        assert!(matches!(error, Error::Unfit { .. }), "{error}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod radii;
 mod saved;
 mod stages;
 
+pub use fitting::crops;
 use fitting::{build_structures, check_fits};
 use iteration::Begun;
 pub use memory::Memory;

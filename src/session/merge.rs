@@ -279,6 +279,7 @@ impl Merge {
             max_depth: first.max_depth,
             profile: Profile::default(),
             failure: None,
+            given: None,
         })
     }
 

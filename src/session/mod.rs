@@ -1,5 +1,6 @@
 //! The public interface for rendering: a scene in, pictures out.
 
+mod crops;
 mod layers;
 mod merge;
 mod prepared;
@@ -10,6 +11,7 @@ mod until;
 mod warning;
 mod work;
 
+pub use crops::{Mosaic, crops};
 pub use merge::Merge;
 pub use prepared::PreparedScene;
 pub use rendered::{Failure, Rendered};

@@ -97,6 +97,14 @@ pub(super) struct Of {
     pub max_depth: u32,
     pub profile: Profile,
     pub failure: Option<Failure>,
+    /// Errors that are known by other means than the estimate.
+    pub given: Option<GivenErrors>,
+}
+
+/// The errors of a picture that was put together.
+pub(super) struct GivenErrors {
+    pub of_pixels: Option<Image>,
+    pub relative: Option<RelativeError>,
 }
 
 /// A picture with its errors, warnings and profile.
@@ -155,6 +163,7 @@ impl Rendered {
             max_depth: about.config.max_depth,
             profile: done.profile,
             failure: done.failure,
+            given: None,
         })
     }
 
@@ -189,6 +198,15 @@ impl Rendered {
         &self.of.picture.alpha
     }
 
+    /// What it shows of the whole picture.
+    pub fn shown(&self) -> Region {
+        self.of.shown
+    }
+
+    pub(super) fn into_parts(self) -> Of {
+        self.of
+    }
+
     /// Iterations in it.
     pub fn iterations(&self) -> u32 {
         self.of.metadata.iterations as u32
@@ -205,14 +223,21 @@ impl Rendered {
             estimate,
             iterations,
             picture,
+            given,
             ..
         } = &self.of;
+        if let Some(given) = given {
+            return given.relative;
+        }
         *self.error.get_or_init(|| estimate.relative(*iterations, picture))
     }
 
     /// The estimated error of each pixel, in units of radiance; `None` as in [`Rendered::error`].
     pub fn pixel_errors(&self) -> Option<Image> {
-        self.of.estimate.of_pixels(self.of.iterations, &self.of.picture)
+        match &self.of.given {
+            Some(given) => given.of_pixels.clone(),
+            None => self.of.estimate.of_pixels(self.of.iterations, &self.of.picture),
+        }
     }
 
     /// Warnings about the picture.
