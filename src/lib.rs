@@ -97,6 +97,6 @@ pub use record::Run;
 pub use report::{Profile, StageTimes, Subject};
 pub use scene::{Camera, Environment, Lens, LoadChoice, Remark, Scene};
 pub use session::{
-    Failure, Hooks, Merge, Platform, PreparedScene, Progress, Rendered, Session, Snapshot, Snapshots, State, Until,
-    Wanted, Warning,
+    Failure, Flicker, Hooks, Merge, Platform, PreparedScene, Progress, Rendered, Session, Snapshot, Snapshots, State,
+    Until, Wanted, Warning,
 };

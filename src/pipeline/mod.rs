@@ -183,6 +183,16 @@ impl Renderer {
         Ok(renderer)
     }
 
+    /// The device with the kernels that are compiled, for another render.
+    ///
+    /// # Errors
+    /// As [`Backend::iterate`].
+    pub fn into_device(mut self) -> Result<Device> {
+        self.complete_ahead()?;
+        self.device.clear();
+        Ok(self.device)
+    }
+
     fn stages(&self) -> Stages<'_> {
         Stages {
             config: &self.config,

@@ -1,5 +1,6 @@
 //! The public interface for rendering: a scene in, pictures out.
 
+mod flicker;
 mod layers;
 mod merge;
 mod prepared;
@@ -10,6 +11,7 @@ mod until;
 mod warning;
 mod work;
 
+pub use flicker::Flicker;
 pub use merge::Merge;
 pub use prepared::PreparedScene;
 pub use rendered::{Failure, Rendered};
@@ -130,27 +132,58 @@ impl Session {
         platform: &Platform,
         begins: &dyn Fn(Phase),
     ) -> Result<Self> {
-        let packed = scene.packed();
-        let is_cpu = *platform == Platform::Cpu;
-        let config = RenderConfig {
-            gather: config
-                .gather
-                .or(Some(if is_cpu { default_cpu_method() } else { default_method() })),
-            ..config.clone()
-        };
-        let renderer = match platform {
+        let device = match platform {
             Platform::Vulkan(device) => {
                 begins(Phase::Compile);
-                let device = Device::open(device.as_deref())?;
-                Renderer::Device(Box::new(pipeline::Renderer::watched(
-                    device,
-                    packed,
-                    camera,
-                    config.clone(),
-                    begins,
-                )?))
+                Some(Device::open(device.as_deref())?)
             }
-            Platform::Cpu => {
+            Platform::Cpu => None,
+        };
+        Self::on(device, scene, camera, config, begins)
+    }
+
+    /// A session of another scene, such as the next frame of an animation, where this one is: kernels that both need are compiled
+    /// already. It learns anew, so its pictures have the bits of [`Session::new`].
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn next(
+        self,
+        scene: &PreparedScene,
+        camera: &Camera,
+        config: &RenderConfig,
+        begins: &dyn Fn(Phase),
+    ) -> Result<Self> {
+        let device = match self.renderer {
+            Renderer::Device(renderer) => {
+                begins(Phase::Compile);
+                Some(renderer.into_device()?)
+            }
+            Renderer::Cpu(_) => None,
+        };
+        Self::on(device, scene, camera, config, begins)
+    }
+
+    /// On a device, or on the CPU.
+    fn on(
+        device: Option<Device>,
+        scene: &PreparedScene,
+        camera: &Camera,
+        config: &RenderConfig,
+        begins: &dyn Fn(Phase),
+    ) -> Result<Self> {
+        let packed = scene.packed();
+        let is_cpu = device.is_none();
+        let config = with_method(config, is_cpu);
+        let renderer = match device {
+            Some(device) => Renderer::Device(Box::new(pipeline::Renderer::watched(
+                device,
+                packed,
+                camera,
+                config.clone(),
+                begins,
+            )?)),
+            None => {
                 begins(Phase::Pilot);
                 Renderer::Cpu(Box::new(cpu::Renderer::new(packed, camera, config.clone())?))
             }
@@ -175,6 +208,14 @@ impl Session {
             scale: packed.scale,
             spent: Duration::ZERO,
         })
+    }
+
+    /// Whether a session of this scene, camera and settings would render the same picture.
+    pub fn is_of(&self, scene: &PreparedScene, camera: &Camera, config: &RenderConfig) -> bool {
+        let is_cpu = matches!(self.renderer, Renderer::Cpu(_));
+        // Layers tell of places in the world, which the identity does not know.
+        self.names.normalisation == scene.names().normalisation
+            && self.identity == Identity::of(scene, camera, &with_method(config, is_cpu), is_cpu)
     }
 
     /// Renders until a limit is reached.
@@ -314,6 +355,15 @@ impl Session {
             Renderer::Device(renderer) => Some(renderer),
             Renderer::Cpu(_) => None,
         }
+    }
+}
+
+/// The settings with a gather method.
+fn with_method(config: &RenderConfig, is_cpu: bool) -> RenderConfig {
+    let default = if is_cpu { default_cpu_method } else { default_method };
+    RenderConfig {
+        gather: config.gather.or_else(|| Some(default())),
+        ..config.clone()
     }
 }
 
