@@ -1,6 +1,6 @@
 //! Command line arguments.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -11,6 +11,7 @@ use super::compare::Compare;
 use super::converge::ConvergeArguments;
 use super::denoise::DenoiseArguments;
 use super::events::ProgressFormat;
+use super::frames::{Frames, RenderFiles};
 use super::manual::Manual;
 use super::merge::MergeArguments;
 use super::outputs::{PictureFiles, named};
@@ -133,6 +134,13 @@ pub struct RenderArguments {
     pub look: LookArguments,
     #[command(flatten)]
     pub denoise: DenoiseArguments,
+    /// Render frames A to B: frame i shows the scene's animations at i / FPS seconds. All files get its number: OUT.####.exr.
+    /// Limits (--iterations, --time, --target-error) are those of each frame (docs/animation.md).
+    #[arg(long, value_name = "A..B", allow_hyphen_values = true, conflicts_with = "frame_time", value_parser = Frames::parse)]
+    pub frames: Option<Frames>,
+    /// Frames per second of --frames.
+    #[arg(long, value_name = "F", requires = "frames", default_value_t = 24.0, allow_negative_numbers = true, value_parser = positive)]
+    pub fps: f64,
     /// Radius of the camera's lens, in scene units, for depth of field [default: a pinhole].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     pub aperture: Option<f64>,
@@ -262,10 +270,10 @@ pub struct RenderArguments {
 
 impl RenderArguments {
     /// The files of the picture.
-    pub fn picture_files(&self, output: &Path) -> PictureFiles {
+    pub fn picture_files(&self, files: &RenderFiles) -> PictureFiles {
         PictureFiles {
-            exr: output.to_owned(),
-            png: self.png.clone(),
+            exr: files.exr.clone(),
+            png: files.png.clone(),
             view_layer: self.layer_name.clone(),
             look: self.look.into(),
         }

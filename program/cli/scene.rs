@@ -53,7 +53,7 @@ pub struct SceneArguments {
     light_radius: f64,
     /// Apply the scene's animations at this time, in seconds [default: everything at rest].
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
-    frame_time: Option<f64>,
+    pub frame_time: Option<f64>,
     /// Maximum memory of the scene while it is read: buffers, geometry, images, environment. A small file can request any amount
     /// [default: 2].
     #[arg(long, value_name = "GIB", allow_negative_numbers = true, value_parser = positive)]
@@ -87,6 +87,11 @@ impl SceneArguments {
 
     /// Reads the scene.
     pub fn load(&self, path: &Path, quiet: bool) -> Result<Scene> {
+        self.load_at(path, self.frame_time, quiet)
+    }
+
+    /// Reads the scene at a time of its animations.
+    pub fn load_at(&self, path: &Path, frame_time: Option<f64>, quiet: bool) -> Result<Scene> {
         let memory_limit = self
             .memory_limit
             .map_or(MEMORY_LIMIT, |gibibytes| (gibibytes * f64::from(1 << 30)) as u64);
@@ -96,7 +101,7 @@ impl SceneArguments {
             Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture, memory_limit)?),
         };
         let options = LoadOptions {
-            frame_time: self.frame_time,
+            frame_time,
             environment,
             memory_limit: Some(memory_limit),
             variant: self.variant.clone(),
@@ -147,10 +152,10 @@ pub fn say_remarks(scene: &Scene) {
 /// Tells of them.
 pub fn tell_remarks(scene: &Scene, events: &Events) {
     for note in &scene.notes {
-        events.note(advice::of_remark(note));
+        events.note_once(advice::of_remark(note));
     }
     for warning in &scene.warnings {
-        events.warning(advice::of_remark(warning));
+        events.warning_once(advice::of_remark(warning));
     }
 }
 
