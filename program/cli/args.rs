@@ -17,6 +17,7 @@ use super::merge::MergeArguments;
 use super::outputs::{PictureFiles, named};
 use super::scene::SceneArguments;
 use super::serve;
+use super::shutter::Shutter;
 use super::view::{self, Address};
 use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
@@ -138,9 +139,13 @@ pub struct RenderArguments {
     /// Limits (--iterations, --time, --target-error) are those of each frame (docs/animation.md).
     #[arg(long, value_name = "A..B", allow_hyphen_values = true, conflicts_with = "frame_time", value_parser = Frames::parse)]
     pub frames: Option<Frames>,
-    /// Frames per second of --frames.
-    #[arg(long, value_name = "F", requires = "frames", default_value_t = 24.0, allow_negative_numbers = true, value_parser = positive)]
-    pub fps: f64,
+    /// Frames per second of --frames and --shutter [default: 24].
+    #[arg(long, value_name = "F", allow_negative_numbers = true, value_parser = positive)]
+    pub fps: Option<f64>,
+    /// Motion blur: the shutter opens and closes at these times, in frames from the time of --frames or --frame-time, such as
+    /// -0.25,0.25 (docs/animation.md).
+    #[arg(long, value_name = "OPEN,CLOSE", allow_hyphen_values = true, value_parser = Shutter::parse)]
+    pub shutter: Option<Shutter>,
     /// Radius of the camera's lens, in scene units, for depth of field [default: a pinhole].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     pub aperture: Option<f64>,

@@ -6,6 +6,8 @@ use super::args::RenderArguments;
 use super::events::{Event, Events, FlickerFigures, Frame};
 use ppm_vk::Rendered;
 
+/// Frames per second.
+const DEFAULT_FPS: f64 = 24.0;
 /// Maximum number of frames, far beyond what a process renders: the files of all are checked before the first one.
 const MOST_FRAMES: u32 = 100_000;
 
@@ -99,6 +101,8 @@ pub struct Shot {
     pub frame: Option<Frame>,
     /// The time in the scene's animations, in seconds.
     pub time: Option<f64>,
+    /// When the shutter opens and closes, if there is motion blur.
+    pub shutter: Option<[f64; 2]>,
     /// Its files.
     pub files: RenderFiles,
 }
@@ -107,15 +111,18 @@ impl Shot {
     /// Those that the arguments ask for.
     pub fn all(arguments: &RenderArguments, exr: &Path) -> Vec<Self> {
         let files = RenderFiles::of(arguments, exr);
+        let fps = arguments.fps.unwrap_or(DEFAULT_FPS);
+        let shutter = |time| Some(arguments.shutter?.around(time, fps));
         let Some(Frames { first, last }) = arguments.frames else {
             return vec![Self {
                 frame: None,
                 time: arguments.read.frame_time,
+                shutter: arguments.read.frame_time.and_then(shutter),
                 files,
             }];
         };
         let of_frame = |frame| {
-            let time = f64::from(frame) / arguments.fps;
+            let time = f64::from(frame) / fps;
             let files = files.of_frame(frame);
             Self {
                 frame: Some(Frame {
@@ -125,6 +132,7 @@ impl Shot {
                     time,
                 }),
                 time: Some(time),
+                shutter: shutter(time),
                 files,
             }
         };

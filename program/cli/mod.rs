@@ -29,6 +29,7 @@ mod save;
 mod scene;
 mod serve;
 mod settings;
+mod shutter;
 mod takers;
 mod view;
 mod watch;

@@ -7,16 +7,19 @@ use anyhow::{Context, Result};
 
 use ppm_vk::internals::files::Writing;
 use ppm_vk::internals::film;
-use ppm_vk::{Denoiser, EmissionChoice, Hooks, Platform, PreparedScene, Rendered, Session, Snapshots, State, Warning};
+use ppm_vk::{
+    Denoiser, EmissionChoice, Hooks, Platform, PreparedScene, Rendered, Scene, Session, Snapshots, State, Warning,
+};
 
 use super::args::RenderArguments;
 use super::denoise::denoise;
 use super::events::{Event, Events, Frame, Phase};
 use super::frames::{RenderFiles, Shot};
 use super::outputs::{all, check_outputs};
-use super::progress::{BUILDING, Meter, while_showing, with_prefix};
+use super::progress::{BUILDING, Meter, READING, while_showing, with_prefix};
 use super::scene::tell_remarks;
 use super::settings::{camera, choose_platform, config, default_output, until};
+use super::shutter::{Exposure, render_space};
 use super::watch::Watch;
 use super::{Outcome, advice, interrupt};
 
@@ -92,12 +95,12 @@ impl Job<'_> {
         let events = &watch.events;
         let quiet = arguments.quiet || arguments.has_events_on_stdout();
         events.begin(Phase::Load);
-        let scene = arguments.read.load_at(path, shot.time, quiet)?;
+        let scene = while_showing(READING, quiet, || self.read(shot))?;
         let mut inputs = arguments.read.inputs(path);
         inputs.extend(scene.files.iter().map(PathBuf::as_path));
         check_outputs(&inputs, shot.files.all())?;
         tell_remarks(&scene, events);
-        let camera = camera(arguments, &scene)?;
+        let (camera, index) = camera(arguments, &scene)?;
         let config = config(arguments, self.gather, &camera);
         events.begin(Phase::Build);
         let prepared = while_showing(BUILDING, quiet, || PreparedScene::new(&scene))?;
@@ -105,7 +108,9 @@ impl Job<'_> {
             events.note_once(note.clone());
         }
         // A state is of this frame alone, and may have more iterations.
-        let is_still = |made: &Made| shot.files.state.is_none() && made.session.is_of(&prepared, &camera, &config);
+        let is_still = |made: &Made| {
+            shot.files.state.is_none() && shot.shutter.is_none() && made.session.is_of(&prepared, &camera, &config)
+        };
         let before = match before {
             Some(made) if is_still(&made) => return self.repeat(shot, made),
             before => before,
@@ -115,11 +120,17 @@ impl Job<'_> {
             ppm_vk::Phase::Pilot => events.begin(Phase::Pilot),
             _ => {}
         };
-        let open = || Session::watched(&prepared, &camera, &config, &self.platform, &begins);
+        let expose = |session: Session| -> Result<Session> {
+            let Some(times) = shot.shutter else { return Ok(session) };
+            let motion = Exposure::new(&arguments.read, path, times, (&scene, index), &camera)?;
+            Ok(session.moving(&prepared, Box::new(motion))?)
+        };
+        let open = || expose(Session::watched(&prepared, &camera, &config, &self.platform, &begins)?);
         let (mut session, before) = match before {
-            Some(Made { session, rendered, .. }) => {
-                (session.next(&prepared, &camera, &config, &begins)?, Some(rendered))
-            }
+            Some(Made { session, rendered, .. }) => (
+                expose(session.next(&prepared, &camera, &config, &begins)?)?,
+                Some(rendered),
+            ),
             None => (open()?, None),
         };
         for warning in session.warnings() {
@@ -177,6 +188,17 @@ impl Job<'_> {
             rendered,
             frame: shot.frame.map(|frame| frame.frame),
         })
+    }
+
+    /// Reads the scene of a shot: that of the middle of the time in which the shutter is open.
+    fn read(&self, shot: &Shot) -> Result<Scene> {
+        let read = &self.arguments.read;
+        let mut file = read.open(self.path)?;
+        let Some([open, close]) = shot.shutter else {
+            return read.scene_at(&mut file, shot.time, None);
+        };
+        let space = render_space(&mut file, [open, close])?;
+        read.scene_at(&mut file, Some(0.5 * (open + close)), Some(space))
     }
 
     /// Writes the picture of the frame before: nothing has moved since, and another render would have the same bits.

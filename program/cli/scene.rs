@@ -10,7 +10,7 @@ use super::args::{choice, number, positive};
 use super::events::Events;
 use super::progress::{READING, while_showing};
 use ppm_vk::internals::loader::MEMORY_LIMIT;
-use ppm_vk::{Environment, LightUnits, LoadOptions, Scene};
+use ppm_vk::{Environment, LightUnits, LoadOptions, Normalisation, Scene, SceneFile};
 
 /// Arguments for reading a scene.
 #[derive(Debug, Args)]
@@ -87,11 +87,25 @@ impl SceneArguments {
 
     /// Reads the scene.
     pub fn load(&self, path: &Path, quiet: bool) -> Result<Scene> {
-        self.load_at(path, self.frame_time, quiet)
+        while_showing(READING, quiet, || {
+            self.scene_at(&mut self.open(path)?, self.frame_time, None)
+        })
     }
 
-    /// Reads the scene at a time of its animations.
-    pub fn load_at(&self, path: &Path, frame_time: Option<f64>, quiet: bool) -> Result<Scene> {
+    /// The scene at a time of its animations, in a render space.
+    pub fn scene_at(
+        &self,
+        file: &mut SceneFile,
+        time: Option<f64>,
+        render_space: Option<Normalisation>,
+    ) -> Result<Scene> {
+        let mut scene = file.at(time, render_space)?;
+        self.place_environment(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Opens the scene's file.
+    pub fn open(&self, path: &Path) -> Result<SceneFile> {
         let memory_limit = self
             .memory_limit
             .map_or(MEMORY_LIMIT, |gibibytes| (gibibytes * f64::from(1 << 30)) as u64);
@@ -101,7 +115,7 @@ impl SceneArguments {
             Some(EnvironmentChoice::Picture(picture)) => Some(Environment::read(picture, memory_limit)?),
         };
         let options = LoadOptions {
-            frame_time,
+            frame_time: self.frame_time,
             environment,
             memory_limit: Some(memory_limit),
             variant: self.variant.clone(),
@@ -111,9 +125,7 @@ impl SceneArguments {
             sun_angle: self.sun_angle,
             light_radius: self.light_radius,
         };
-        let mut scene = while_showing(READING, quiet, || Scene::load_with(path, options))?;
-        self.place_environment(&mut scene)?;
-        Ok(scene)
+        Ok(SceneFile::open(path, options)?)
     }
 
     /// Scales and rotates the environment, also the default one of a scene without lights.

@@ -15,19 +15,20 @@ use super::args::{Arguments, BackendChoice, RenderArguments};
 /// Default number of iterations, without a time limit.
 const DEFAULT_ITERATIONS: u32 = 64;
 
-/// The scene's camera as the arguments have it.
+/// The scene's camera as the arguments have it, and its index.
 ///
 /// # Errors
 /// A camera that the scene does not have; a lens that can't be focused.
-pub fn camera(arguments: &RenderArguments, scene: &Scene) -> Result<Camera> {
-    let mut camera = scene.cameras[scene.camera_index(arguments.camera.as_deref())?].clone();
+pub fn camera(arguments: &RenderArguments, scene: &Scene) -> Result<(Camera, usize)> {
+    let index = scene.camera_index(arguments.camera.as_deref())?;
+    let mut camera = scene.cameras[index].clone();
     if let Some(radius) = arguments.aperture {
         camera.lens = Some(scene.lens(&camera, radius, arguments.focus)?);
     }
     if let Some([x, y]) = arguments.shift {
         camera.shift = Vec2::new(x, y);
     }
-    Ok(camera)
+    Ok((camera, index))
 }
 
 /// The limits of a render.
@@ -63,6 +64,16 @@ pub fn choose_platform(arguments: &RenderArguments) -> (Platform, usize) {
         Some("--backend cpu has the layers samples and error alone")
     } else if arguments.aov.iter().any(|layer| layer.needs_device()) && !arguments.part.is_whole() {
         Some("parts have no layers but samples and error: ppm-vk merge would leave them out")
+    } else if arguments.fps.is_some() && arguments.frames.is_none() && arguments.shutter.is_none() {
+        Some("--fps needs --frames or --shutter")
+    } else if arguments.shutter.is_some() && arguments.frames.is_none() && arguments.read.frame_time.is_none() {
+        Some("--shutter opens around a time: it needs --frames or --frame-time")
+    } else if arguments.shutter.is_some() && backend == BackendChoice::Cpu {
+        Some("--backend cpu has no --shutter")
+    } else if arguments.shutter.is_some() && arguments.estimator == Estimator::Ppm {
+        Some("--estimator ppm finds visible points once: it has no --shutter")
+    } else if arguments.shutter.is_some() && method != gather::default_method() {
+        Some("--shutter needs the default --gather")
     } else if backend == BackendChoice::Cpu && arguments.device.is_some() {
         Some("the CPU backend has no --device")
     } else {

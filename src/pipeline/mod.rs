@@ -4,6 +4,7 @@ mod aim;
 mod fitting;
 mod iteration;
 mod memory;
+mod pose;
 mod radii;
 mod saved;
 mod stages;

@@ -5,6 +5,7 @@ mod layers;
 mod merge;
 mod prepared;
 mod rendered;
+mod shutter;
 mod snapshot;
 mod state;
 mod until;
@@ -15,6 +16,7 @@ pub use flicker::Flicker;
 pub use merge::Merge;
 pub use prepared::PreparedScene;
 pub use rendered::{Failure, Rendered};
+pub use shutter::Motion;
 pub use snapshot::{Snapshot, Snapshots, Wanted};
 pub use state::State;
 pub use until::{Progress, Until};
@@ -24,8 +26,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::backend::{Backend, DeviceDescription, Phase};
-use crate::config::{MAX_SIDE, RenderConfig};
-use crate::error::Result;
+use crate::config::{Estimator, MAX_SIDE, RenderConfig};
+use crate::error::{Error, Result};
 use crate::estimate::{ErrorEstimate, RelativeError, of_one_photon};
 use crate::film::Image;
 use crate::gather::{METHODS, default_cpu_method, default_method};
@@ -35,6 +37,7 @@ use crate::scene::Camera;
 use crate::{cpu, pipeline};
 use layers::SceneNames;
 use rendered::About;
+use shutter::Moving;
 use state::Identity;
 use work::Work;
 
@@ -78,6 +81,7 @@ impl Default for Hooks<'_> {
 
 enum Renderer {
     Device(Box<pipeline::Renderer>),
+    Moving(Box<Moving>),
     Cpu(Box<cpu::Renderer>),
 }
 
@@ -159,9 +163,36 @@ impl Session {
                 begins(Phase::Compile);
                 Some(renderer.into_device()?)
             }
+            Renderer::Moving(moving) => {
+                begins(Phase::Compile);
+                Some(moving.renderer.into_device()?)
+            }
             Renderer::Cpu(_) => None,
         };
         Self::on(device, scene, camera, config, begins)
+    }
+
+    /// The same session with motion blur: each iteration renders the scene at a time of its own while the shutter is open.
+    /// Radii and emission tables are found in `scene`, of which the session was made: that of the middle of the time.
+    ///
+    /// # Errors
+    /// A session on the CPU, one of the estimator `ppm`, whose visible points are found once, or one with a gather method of the paper,
+    /// whose grids are those of one scene; a scene that can't be read.
+    pub fn moving(self, scene: &PreparedScene, motion: Box<dyn Motion>) -> Result<Self> {
+        if self.config.estimator == Estimator::Ppm || self.config.gather != Some(default_method()) {
+            let what = "motion blur needs the estimator sppm and the default gather method";
+            return Err(Error::Config(what.to_owned()));
+        }
+        let Renderer::Device(renderer) = self.renderer else {
+            return Err(Error::Config("motion blur needs a Vulkan device".to_owned()));
+        };
+        let mut moving = Moving::new(*renderer, self.config.clone(), scene.packed(), motion);
+        let ends = moving.ends()?;
+        Ok(Self {
+            identity: self.identity.between(&self.config, &ends),
+            renderer: Renderer::Moving(Box::new(moving)),
+            ..self
+        })
     }
 
     /// On a device, or on the CPU.
@@ -353,6 +384,7 @@ impl Session {
     pub fn on_device(&mut self) -> Option<&mut pipeline::Renderer> {
         match &mut self.renderer {
             Renderer::Device(renderer) => Some(renderer),
+            Renderer::Moving(moving) => Some(&mut moving.renderer),
             Renderer::Cpu(_) => None,
         }
     }
@@ -371,6 +403,7 @@ impl Renderer {
     fn backend(&self) -> &dyn Backend {
         match self {
             Self::Device(renderer) => renderer.as_ref(),
+            Self::Moving(moving) => moving.as_ref(),
             Self::Cpu(renderer) => renderer.as_ref(),
         }
     }
@@ -378,6 +411,7 @@ impl Renderer {
     fn backend_mut(&mut self) -> &mut dyn Backend {
         match self {
             Self::Device(renderer) => renderer.as_mut(),
+            Self::Moving(moving) => moving.as_mut(),
             Self::Cpu(renderer) => renderer.as_mut(),
         }
     }
