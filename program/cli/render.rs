@@ -1,5 +1,6 @@
 //! Renders a scene to files.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -8,7 +9,8 @@ use anyhow::{Context, Result};
 use ppm_vk::internals::files::Writing;
 use ppm_vk::internals::film;
 use ppm_vk::{
-    Denoiser, EmissionChoice, Hooks, Platform, PreparedScene, Rendered, Scene, Session, Snapshots, State, Warning,
+    Denoiser, EmissionChoice, Hooks, Platform, PreparedScene, Rendered, Scene, SceneFile, Session, Snapshots, State,
+    Warning,
 };
 
 use super::args::RenderArguments;
@@ -33,6 +35,7 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
         arguments,
         path,
         shots: Shot::all(arguments, &output),
+        file: Cell::new(None),
         platform,
         gather,
         watch: &watch,
@@ -47,6 +50,8 @@ struct Job<'a> {
     arguments: &'a RenderArguments,
     path: &'a Path,
     shots: Vec<Shot>,
+    /// The scene's file, between two frames.
+    file: Cell<Option<SceneFile>>,
     platform: Platform,
     gather: usize,
     watch: &'a Watch<'a>,
@@ -193,12 +198,18 @@ impl Job<'_> {
     /// Reads the scene of a shot: that of the middle of the time in which the shutter is open.
     fn read(&self, shot: &Shot) -> Result<Scene> {
         let read = &self.arguments.read;
-        let mut file = read.open(self.path)?;
-        let Some([open, close]) = shot.shutter else {
-            return read.scene_at(&mut file, shot.time, None);
+        let mut file = self.file.take().map_or_else(|| read.open(self.path), Ok)?;
+        let scene = match shot.shutter {
+            None => read.scene_at(&mut file, shot.time, None)?,
+            Some([open, close]) => {
+                let space = render_space(&mut file, [open, close])?;
+                read.scene_at(&mut file, Some(0.5 * (open + close)), Some(space))?
+            }
         };
-        let space = render_space(&mut file, [open, close])?;
-        read.scene_at(&mut file, Some(0.5 * (open + close)), Some(space))
+        if self.shots.len() > 1 {
+            self.file.set(Some(file));
+        }
+        Ok(scene)
     }
 
     /// Writes the picture of the frame before: nothing has moved since, and another render would have the same bits.

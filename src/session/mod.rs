@@ -26,8 +26,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::backend::{Backend, DeviceDescription, Phase};
-use crate::config::{Estimator, MAX_SIDE, RenderConfig};
-use crate::error::{Error, Result};
+use crate::config::{MAX_SIDE, RenderConfig};
+use crate::error::Result;
 use crate::estimate::{ErrorEstimate, RelativeError, of_one_photon};
 use crate::film::Image;
 use crate::gather::{METHODS, default_cpu_method, default_method};
@@ -170,29 +170,6 @@ impl Session {
             Renderer::Cpu(_) => None,
         };
         Self::on(device, scene, camera, config, begins)
-    }
-
-    /// The same session with motion blur: each iteration renders the scene at a time of its own while the shutter is open.
-    /// Radii and emission tables are found in `scene`, of which the session was made: that of the middle of the time.
-    ///
-    /// # Errors
-    /// A session on the CPU, one of the estimator `ppm`, whose visible points are found once, or one with a gather method of the paper,
-    /// whose grids are those of one scene; a scene that can't be read.
-    pub fn moving(self, scene: &PreparedScene, motion: Box<dyn Motion>) -> Result<Self> {
-        if self.config.estimator == Estimator::Ppm || self.config.gather != Some(default_method()) {
-            let what = "motion blur needs the estimator sppm and the default gather method";
-            return Err(Error::Config(what.to_owned()));
-        }
-        let Renderer::Device(renderer) = self.renderer else {
-            return Err(Error::Config("motion blur needs a Vulkan device".to_owned()));
-        };
-        let mut moving = Moving::new(*renderer, self.config.clone(), scene.packed(), motion);
-        let ends = moving.ends()?;
-        Ok(Self {
-            identity: self.identity.between(&self.config, &ends),
-            renderer: Renderer::Moving(Box::new(moving)),
-            ..self
-        })
     }
 
     /// On a device, or on the CPU.

@@ -1,8 +1,14 @@
 //! Motion blur: each iteration renders the scene at one time while the shutter is open.
 
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+
+use super::{PreparedScene, Renderer, Session};
 use crate::backend::{Backend, DeviceDescription, Figures, Resolved};
-use crate::config::{RenderConfig, SEQUENCES};
+use crate::config::{Estimator, RenderConfig, SEQUENCES};
 use crate::error::{Error, Result};
+use crate::gather::default_method;
 use crate::packing::PackedScene;
 use crate::pipeline;
 use crate::random::pcg4d;
@@ -32,16 +38,38 @@ fn part_of(config: &RenderConfig, iteration: u32) -> f64 {
     f64::from(place) / 2f64.powi(32)
 }
 
+/// The scene at one time, in the device's layout.
+type Pose = (PackedScene, Camera);
+
+/// Makes poses.
+struct Poses {
+    motion: Mutex<Box<dyn Motion>>,
+    /// The scene that the session began with.
+    first: PackedScene,
+}
+
+impl Poses {
+    fn at(&self, part: f64) -> Result<Pose> {
+        let (scene, camera) = self.motion.lock().unwrap_or_else(PoisonError::into_inner).pose(part)?;
+        if scene.normalisation.scale != self.first.scale {
+            return Err(Error::Config("the scene moves to another render space".to_owned()));
+        }
+        let path = scene.files.first().map_or(Path::new(&scene.name), |file| file);
+        let packed = self.first.moved(&scene).map_err(|what| Error::scene(path, what))?;
+        Ok((packed, camera))
+    }
+}
+
 /// A renderer of a scene that moves.
 pub(super) struct Moving {
     pub renderer: pipeline::Renderer,
     config: RenderConfig,
-    motion: Box<dyn Motion>,
-    /// The scene that it began with.
-    first: PackedScene,
+    poses: Arc<Poses>,
     /// The scene that is on the device, and its iteration.
     shown: PackedScene,
     iteration: Option<u32>,
+    /// The pose of a later iteration, which a thread makes while the device renders.
+    next: Option<(u32, JoinHandle<Result<Pose>>)>,
 }
 
 impl Moving {
@@ -51,29 +79,23 @@ impl Moving {
         scene: &PackedScene,
         motion: Box<dyn Motion>,
     ) -> Self {
+        let poses = Poses {
+            motion: Mutex::new(motion),
+            first: scene.clone(),
+        };
         Self {
             renderer,
             config,
-            motion,
-            first: scene.clone(),
+            poses: Arc::new(poses),
             shown: scene.clone(),
             iteration: None,
+            next: None,
         }
     }
 
     /// Where everything is when the shutter opens and closes.
-    pub fn ends(&mut self) -> Result<[(PackedScene, Camera); 2]> {
-        Ok([self.packed(0.0)?, self.packed(1.0)?])
-    }
-
-    fn packed(&mut self, part: f64) -> Result<(PackedScene, Camera)> {
-        let (scene, camera) = self.motion.pose(part)?;
-        if scene.normalisation.scale != self.first.scale {
-            return Err(Error::Config("the scene moves to another render space".to_owned()));
-        }
-        let path = scene.files.first().map_or(scene.name.as_ref(), |file| file.as_path());
-        let packed = self.first.moved(&scene).map_err(|what| Error::scene(path, what))?;
-        Ok((packed, camera))
+    pub fn ends(&self) -> Result<[Pose; 2]> {
+        Ok([self.poses.at(0.0)?, self.poses.at(1.0)?])
     }
 
     /// Shows the scene at an iteration's time.
@@ -81,10 +103,44 @@ impl Moving {
         if self.iteration == Some(iteration) {
             return Ok(());
         }
-        let (scene, camera) = self.packed(part_of(&self.config, iteration))?;
-        self.renderer.pose(&self.first, &self.shown, &scene, &camera)?;
-        (self.shown, self.iteration) = (scene, Some(iteration));
+        let part = part_of(&self.config, iteration);
+        let made = match self.next.take() {
+            Some((next, thread)) if next == iteration => thread.join().ok(),
+            _ => None,
+        };
+        // A thread that panicked has told so; here it does again.
+        let (scene, camera) = made.unwrap_or_else(|| self.poses.at(part))?;
+        self.renderer.pose(&self.poses.first, &self.shown, &scene, &camera)?;
+        self.iteration = Some(iteration);
+        self.shown = scene;
+        let (poses, part) = (self.poses.clone(), part_of(&self.config, iteration + 1));
+        self.next = Some((iteration + 1, thread::spawn(move || poses.at(part))));
         Ok(())
+    }
+}
+
+impl Session {
+    /// The same session with motion blur: each iteration renders the scene at a time of its own while the shutter is open.
+    /// Radii and emission tables are found in `scene`, of which the session was made: that of the middle of the time.
+    ///
+    /// # Errors
+    /// A session on the CPU, one of the estimator `ppm`, whose visible points are found once, or one with a gather method of the paper,
+    /// whose grids are those of one scene; a scene that can't be read.
+    pub fn moving(self, scene: &PreparedScene, motion: Box<dyn Motion>) -> Result<Self> {
+        if self.config.estimator == Estimator::Ppm || self.config.gather != Some(default_method()) {
+            let what = "motion blur needs the estimator sppm and the default gather method";
+            return Err(Error::Config(what.to_owned()));
+        }
+        let Renderer::Device(renderer) = self.renderer else {
+            return Err(Error::Config("motion blur needs a Vulkan device".to_owned()));
+        };
+        let moving = Moving::new(*renderer, self.config.clone(), scene.packed(), motion);
+        let ends = moving.ends()?;
+        Ok(Self {
+            identity: self.identity.between(&self.config, &ends),
+            renderer: Renderer::Moving(Box::new(moving)),
+            ..self
+        })
     }
 }
 

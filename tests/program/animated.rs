@@ -7,22 +7,24 @@ use serde_json::{Value, json};
 
 /// Writes `scene.gltf` into a folder: the Cornell box, whose short block moves for a second.
 pub fn cornell(folder: &Path) {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.gltf");
-    let mut scene: Value = serde_json::from_slice(&fs::read(source).expect("scene")).expect("JSON");
-    fs::copy(
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.bin"),
-        folder.join("cornell.bin"),
-    )
-    .expect("buffer");
-    let node = scene["nodes"]
-        .as_array()
-        .expect("nodes")
-        .iter()
-        .position(|node| node["name"] == "short")
-        .expect("the short block");
+    moving(folder, "cornell", "short", [[0.33, 0.0005, 0.35], [-0.2, 0.5, 0.35]]);
+}
+
+/// Writes `scene.gltf` into a folder: a scene of `scenes/` in which a node moves from one place to another for a second.
+pub fn moving(folder: &Path, name: &str, node: &str, [from, to]: [[f32; 3]; 2]) {
+    let shipped = |ending| {
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("scenes")
+            .join(format!("{name}.{ending}"))
+    };
+    let mut scene: Value = serde_json::from_slice(&fs::read(shipped("gltf")).expect("scene")).expect("JSON");
+    fs::copy(shipped("bin"), folder.join(format!("{name}.bin"))).expect("buffer");
+    let nodes = scene["nodes"].as_array().expect("nodes");
+    let node = nodes.iter().position(|other| other["name"] == node);
+    let node = node.expect("the node");
     // Two times; two translations.
-    let values = [0.0f32, 1.0, 0.33, 0.0005, 0.35, -0.2, 0.5, 0.35];
-    fs::write(folder.join("move.bin"), bytemuck::bytes_of(&values)).expect("buffer");
+    let values = [&[0.0f32, 1.0], &from[..], &to[..]].concat();
+    fs::write(folder.join("move.bin"), bytemuck::cast_slice::<_, u8>(&values)).expect("buffer");
     let mut add = |list: &str, entry: Value| {
         let list = scene[list].as_array_mut().expect("a list");
         list.push(entry);
