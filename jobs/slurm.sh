@@ -22,7 +22,7 @@ submit() {
     shift 2
     mkdir -p "$(dirname "$base")"
     for frame in ${FRAMES:-0}; do
-        time=$(LC_ALL=C awk -v frame="$frame" -v fps="$fps" 'BEGIN { printf "%.9g", frame / fps }')
+        time=$(LC_ALL=C awk -v frame="$frame" -v fps="$fps" 'BEGIN { printf "%.17g", frame / fps }')
         job=$(sbatch --parsable --array="1-$parts" --output="$(base_of "$frame").part%a.log" "${BASH_SOURCE[0]}" \
             --task "$(base_of "$frame")" "$parts" --scene "$scene" --frame-time "$time" "$@")
         # With a cluster's name after a semicolon, where there are several.

@@ -199,6 +199,16 @@ impl ErrorEstimate {
         })
     }
 
+    /// The squared noise of each pixel's channels, in units of radiance; `None` as in [`ErrorEstimate::relative`].
+    pub fn noise2_of_pixels(
+        &self,
+        iterations: impl Into<SequenceIterations>,
+        picture: &Resolved,
+    ) -> Option<Vec<[f64; 3]>> {
+        let parts = self.parts(iterations.into(), picture)?;
+        Some(parts.pixels.into_iter().map(|pixel| pixel.noise2).collect())
+    }
+
     /// The error of each pixel, root of the mean square, in units of radiance; `None` as in [`ErrorEstimate::relative`], whose
     /// error they add up to. A pixel's bias is that of the pixels around it: its own estimate is dominated by noise.
     pub fn of_pixels(&self, iterations: impl Into<SequenceIterations>, picture: &Resolved) -> Option<Image> {

@@ -90,13 +90,13 @@ pub use error::{Error, Remedy, Result, Setting};
 pub use estimate::RelativeError;
 pub use film::{Exposure, Image, Look, Tone, read_exr};
 pub use gpu::{DeviceSummary, best_device, devices};
-pub use loader::{LightUnits, LoadOptions};
+pub use loader::{LightUnits, LoadOptions, SceneFile};
 pub use metrics::{Comparison, compare, flip};
 pub use pipeline::Memory;
 pub use record::Run;
 pub use report::{Profile, StageTimes, Subject};
-pub use scene::{Camera, Environment, Lens, LoadChoice, Remark, Scene};
+pub use scene::{Camera, Environment, Lens, LoadChoice, Normalisation, Remark, Scene};
 pub use session::{
-    Failure, Hooks, Merge, Mosaic, Platform, PreparedScene, Progress, Rendered, Session, Snapshot, Snapshots, State,
-    Until, Wanted, Warning, crops,
+    Failure, Flicker, Hooks, Merge, Mosaic, Motion, Platform, PreparedScene, Progress, Rendered, Session, Snapshot,
+    Snapshots, State, Until, Wanted, Warning, crops,
 };

@@ -1,6 +1,8 @@
 //! The job descriptions in `jobs/`, run by the schedulers that they are for.
 #![cfg(unix)]
 
+#[path = "program/animated.rs"]
+mod animated;
 #[path = "program/mod.rs"]
 mod program;
 
@@ -12,7 +14,6 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use program::{ppm_vk, stderr};
-use serde_json::{Value, json};
 use tempfile::TempDir;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -30,43 +31,7 @@ impl Farm {
         let farm = Self {
             folder: TempDir::new().expect("folder"),
         };
-        let source = Path::new(ROOT).join("scenes/cornell.gltf");
-        let mut scene: Value = serde_json::from_slice(&fs::read(source).expect("scene")).expect("JSON");
-        fs::copy(Path::new(ROOT).join("scenes/cornell.bin"), farm.path("cornell.bin")).expect("buffer");
-        let node = scene["nodes"]
-            .as_array()
-            .expect("nodes")
-            .iter()
-            .position(|node| node["name"] == "short")
-            .expect("the short block");
-        // Two times; two translations.
-        let values = [0.0f32, 1.0, 0.33, 0.0005, 0.35, -0.2, 0.5, 0.35];
-        fs::write(farm.path("move.bin"), bytemuck::bytes_of(&values)).expect("buffer");
-        let mut add = |list: &str, entry: Value| {
-            let list = scene[list].as_array_mut().expect("a list");
-            list.push(entry);
-            list.len() - 1
-        };
-        let buffer = add("buffers", json!({"uri": "move.bin", "byteLength": 32}));
-        let times = add("bufferViews", json!({"buffer": buffer, "byteLength": 8}));
-        let places = add(
-            "bufferViews",
-            json!({"buffer": buffer, "byteOffset": 8, "byteLength": 24}),
-        );
-        let times = add(
-            "accessors",
-            json!({"bufferView": times, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0.0], "max": [1.0]}),
-        );
-        let places = add(
-            "accessors",
-            json!({"bufferView": places, "componentType": 5126, "count": 2, "type": "VEC3"}),
-        );
-        scene["animations"] = json!([{
-            "samplers": [{"input": times, "output": places}],
-            "channels": [{"sampler": 0, "target": {"node": node, "path": "translation"}}],
-        }]);
-        fs::write(farm.path("scene.gltf"), scene.to_string()).expect("scene");
-
+        animated::cornell(farm.folder.path());
         fs::create_dir(farm.path("bin")).expect("folder");
         let script = format!(
             "#!/bin/sh\necho $$ >>'{}'\nexec '{}' \"$@\"\n",

@@ -58,7 +58,7 @@ pub fn of_failure(failure: &Failure) -> Error {
 /// A remark about a scene.
 pub fn of_remark(remark: &Remark) -> String {
     let flag = match remark.choice() {
-        Some(LoadChoice::FrameTime) => "--frame-time SECONDS applies them",
+        Some(LoadChoice::FrameTime) => "--frame-time SECONDS applies them, --frames A..B renders several",
         Some(LoadChoice::Environment) => "--environment sets another one",
         Some(LoadChoice::Scene) => "--scene-name chooses another one",
         Some(LoadChoice::LightUnits) => "--light-units spec",

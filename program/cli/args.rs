@@ -1,6 +1,6 @@
 //! Command line arguments.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -11,11 +11,13 @@ use super::compare::Compare;
 use super::converge::ConvergeArguments;
 use super::denoise::DenoiseArguments;
 use super::events::ProgressFormat;
+use super::frames::{Frames, RenderFiles};
 use super::manual::Manual;
 use super::merge::MergeArguments;
 use super::outputs::{PictureFiles, named};
 use super::scene::SceneArguments;
 use super::serve;
+use super::shutter::Shutter;
 use super::view::{self, Address};
 use ppm_vk::internals::config::ranges;
 use ppm_vk::internals::gather;
@@ -133,6 +135,17 @@ pub struct RenderArguments {
     pub look: LookArguments,
     #[command(flatten)]
     pub denoise: DenoiseArguments,
+    /// Render frames A to B: frame i shows the scene's animations at i / FPS seconds. All files get its number: OUT.####.exr.
+    /// Limits (--iterations, --time, --target-error) are those of each frame (docs/animation.md).
+    #[arg(long, value_name = "A..B", allow_hyphen_values = true, conflicts_with = "frame_time", value_parser = Frames::parse)]
+    pub frames: Option<Frames>,
+    /// Frames per second of --frames and --shutter [default: 24].
+    #[arg(long, value_name = "F", allow_negative_numbers = true, value_parser = positive)]
+    pub fps: Option<f64>,
+    /// Motion blur: the shutter opens and closes at these times, in frames from the time of --frames or --frame-time, such as
+    /// -0.25,0.25 (docs/animation.md).
+    #[arg(long, value_name = "OPEN,CLOSE", allow_hyphen_values = true, value_parser = Shutter::parse)]
+    pub shutter: Option<Shutter>,
     /// Radius of the camera's lens, in scene units, for depth of field [default: a pinhole].
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = positive)]
     pub aperture: Option<f64>,
@@ -266,10 +279,10 @@ pub struct RenderArguments {
 
 impl RenderArguments {
     /// The files of the picture.
-    pub fn picture_files(&self, output: &Path) -> PictureFiles {
+    pub fn picture_files(&self, files: &RenderFiles) -> PictureFiles {
         PictureFiles {
-            exr: output.to_owned(),
-            png: self.png.clone(),
+            exr: files.exr.clone(),
+            png: files.png.clone(),
             view_layer: self.layer_name.clone(),
             look: self.look.into(),
         }

@@ -2,34 +2,35 @@
 
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
-use ppm_vk::{Camera, Error, Hooks, Mosaic, PreparedScene, Progress, RenderConfig, Session, Until, crops};
+use anyhow::{Error, Result, bail};
+use ppm_vk::{Camera, Denoiser, Hooks, Mosaic, PreparedScene, Progress, RenderConfig, Rendered, Session, Until, crops};
 
 use super::args::RenderArguments;
 use super::denoise::denoise;
 use super::events::{Event, Phase};
+use super::frames::Shot;
 use super::outputs::all;
 use super::progress::Meter;
-use super::render::{Job, tell_warnings, until, write_outputs};
-use super::{Outcome, advice, interrupt};
+use super::render::{Job, tell_once, tell_warnings, write_outputs};
+use super::settings::until;
+use super::{advice, interrupt};
 
 impl Job<'_> {
-    /// Renders crops one after another, and writes the picture that they make. `too_large` says why the device can't render it
-    /// at once.
+    /// Renders crops of a shot one after another, and writes the picture that they make. `too_large` says why the device can't
+    /// render it at once.
     pub(super) fn in_crops(
         &self,
-        scene: &PreparedScene,
-        camera: &Camera,
-        config: &RenderConfig,
-        too_large: Error,
-    ) -> Result<Outcome> {
+        shot: &Shot,
+        denoiser: Option<&Denoiser>,
+        (scene, camera, config): (&PreparedScene, &Camera, &RenderConfig),
+        too_large: &Error,
+    ) -> Result<Arc<Rendered>> {
         let (arguments, events) = (self.arguments, &self.watch.events);
         if let Some(flag) = needs_one_piece(arguments) {
-            let why = advice::of_library(&too_large);
+            let why = advice::line(too_large);
             bail!("{why}. Without {flag}, the picture is rendered in crops");
         }
         let crops = crops(scene, config, &self.platform)?;
-        let denoiser = arguments.denoise.open()?;
         let [width, height] = config.shown().size;
         say!(
             "{width}x{height} pixels are too many for the device at once: rendering {} crops of {}x{}, one after another",
@@ -50,7 +51,7 @@ impl Job<'_> {
             };
             let mut session = Session::watched(scene, camera, &config, &self.platform, &|_| ())?;
             if number == 0 {
-                tell_warnings(events, session.warnings());
+                tell_once(events, session.warnings());
                 events.begin(Phase::Iterate);
             }
             let meter = Meter::new(until, &session);
@@ -77,16 +78,12 @@ impl Job<'_> {
         let Some(mut rendered) = mosaic.finish() else {
             bail!("no crop was rendered");
         };
-        let denoised = denoise(&mut rendered, denoiser.as_ref());
+        let denoised = denoise(&mut rendered, denoiser);
         let rendered = Arc::new(rendered);
-        self.watch.takers().end(Some(&rendered));
+        self.watch.takers(&shot.files).end(Some(&rendered));
         tell_warnings(events, &rendered.warnings());
-        all([write_outputs(arguments, events, self.output, &rendered), denoised])?;
-        Ok(if interrupt::requested() {
-            Outcome::Interrupted
-        } else {
-            Outcome::Done
-        })
+        all([write_outputs(arguments, events, &shot.files, &rendered), denoised])?;
+        Ok(rendered)
     }
 }
 
@@ -94,6 +91,7 @@ impl Job<'_> {
 fn needs_one_piece(arguments: &RenderArguments) -> Option<&'static str> {
     let flags = [
         (arguments.state.is_some(), "--state"),
+        (arguments.shutter.is_some(), "--shutter"),
         (arguments.save_every.is_some(), "--save-every"),
         (arguments.view.is_some(), "--view"),
         (arguments.serve.is_some(), "--serve"),

@@ -1,13 +1,16 @@
 //! What happens in a render, told to all who follow it: the progress bar, a script (`--progress json`), a browser (`--serve`).
 
+use std::collections::HashSet;
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use clap::ValueEnum;
 use serde::Serialize;
 
+use ppm_vk::Flicker;
 use ppm_vk::internals::text::escaped;
 
 /// The value of `--progress`.
@@ -21,6 +24,19 @@ pub enum ProgressFormat {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
+    /// A frame of an animation begins.
+    Frame(Frame),
+    /// A frame is done, and its files are written.
+    FrameDone {
+        /// Its number.
+        frame: u32,
+        /// The frame whose picture it has, because nothing moved since.
+        same_as: Option<u32>,
+        /// Estimated relative error, if known.
+        estimated_error: Option<f64>,
+        /// How it differs from the frame before it, if known.
+        flicker: Option<FlickerFigures>,
+    },
     /// A phase begins.
     Phase {
         /// The phase.
@@ -55,6 +71,46 @@ pub enum Event {
         /// Whether it was interrupted.
         interrupted: bool,
     },
+}
+
+/// A frame of an animation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Frame {
+    /// Its number.
+    pub frame: u32,
+    /// Number of the first frame that is rendered.
+    pub first: u32,
+    /// Number of the last frame that is rendered.
+    pub last: u32,
+    /// Its time in the scene's animations, in seconds.
+    pub time: f64,
+}
+
+/// How a frame differs from the one before it (docs/animation.md).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FlickerFigures {
+    /// Share of the picture that does not change.
+    pub still: f64,
+    /// Relative difference there.
+    pub difference: f64,
+    /// The difference there that noise explains.
+    pub noise: f64,
+}
+
+impl From<Flicker> for FlickerFigures {
+    fn from(
+        Flicker {
+            still,
+            difference,
+            noise,
+        }: Flicker,
+    ) -> Self {
+        Self {
+            still,
+            difference,
+            noise,
+        }
+    }
 }
 
 /// The phases of a render, in order.
@@ -106,6 +162,8 @@ pub trait Listener: Send + Sync {
 pub struct Events {
     start: Instant,
     listeners: Vec<Box<dyn Listener>>,
+    /// Remarks that are told once.
+    told: Mutex<HashSet<String>>,
 }
 
 impl Events {
@@ -114,6 +172,7 @@ impl Events {
         Self {
             start: Instant::now(),
             listeners,
+            told: Mutex::default(),
         }
     }
 
@@ -134,6 +193,26 @@ impl Events {
     pub fn note(&self, text: String) {
         say!("note: {text}");
         self.tell(&Event::Note { text });
+    }
+
+    /// The same once, however many frames it is true of.
+    pub fn note_once(&self, text: String) {
+        if self.is_new(&text) {
+            self.note(text);
+        }
+    }
+
+    /// Tells of a warning once.
+    pub fn warning_once(&self, text: String) {
+        if self.is_new(&text) {
+            self.warning(text);
+        }
+    }
+
+    /// Whether a text was not asked for before.
+    pub fn is_new(&self, text: &str) -> bool {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        told.insert(text.to_owned())
     }
 
     /// Tells of a warning, also on stderr.

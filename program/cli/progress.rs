@@ -2,12 +2,13 @@
 
 use std::io::IsTerminal;
 use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::events::{Event, Iteration, Listener, Phase};
+use super::events::{Event, Frame, Iteration, Listener, Phase};
 use ppm_vk::{Progress, Session, Until};
 
 /// Measures a render.
@@ -51,7 +52,11 @@ impl Meter {
 }
 
 /// A bar on stderr; nothing if stderr is no terminal.
-pub struct Bar(ProgressBar);
+pub struct Bar {
+    bar: ProgressBar,
+    /// The frame of an animation.
+    frame: Mutex<Option<Frame>>,
+}
 
 const STEPS: u64 = 1000;
 
@@ -67,11 +72,12 @@ impl Bar {
         if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} % {msg}") {
             bar.set_style(style);
         }
-        Self(bar)
+        let frame = Mutex::default();
+        Self { bar, frame }
     }
 
     fn show(&self, state: &Iteration) {
-        self.0.set_position((state.share * STEPS as f64) as u64);
+        self.bar.set_position((state.share * STEPS as f64) as u64);
         let of = state.iterations.map_or(String::new(), |limit| format!("/{limit}"));
         let error = state
             .estimated_error
@@ -79,8 +85,12 @@ impl Bar {
         let left = state
             .seconds_left
             .map_or(String::new(), |left| format!(", {} left", clock(left)));
-        self.0.set_message(format!(
-            "{}{of} iterations{error}, {} photon paths/s{left}",
+        let frame = *self.frame.lock().unwrap_or_else(PoisonError::into_inner);
+        let frame = frame.map_or(String::new(), |frame| {
+            format!("frame {} of {}..{}: ", frame.frame, frame.first, frame.last)
+        });
+        self.bar.set_message(format!(
+            "{frame}{}{of} iterations{error}, {} photon paths/s{left}",
             state.iteration,
             with_prefix(state.photons_per_second),
         ));
@@ -91,7 +101,11 @@ impl Listener for Bar {
     fn hear(&self, event: &Event, _: f64) {
         match event {
             Event::Iteration(state) => self.show(state),
-            Event::Phase { phase: Phase::Write } | Event::Error { .. } => self.0.finish_and_clear(),
+            Event::Frame(frame) => {
+                *self.frame.lock().unwrap_or_else(PoisonError::into_inner) = Some(*frame);
+                self.bar.reset();
+            }
+            Event::Phase { phase: Phase::Write } | Event::Error { .. } => self.bar.finish_and_clear(),
             _ => {}
         }
     }

@@ -1,32 +1,29 @@
 //! Renders a scene to files.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use clap::CommandFactory;
-use clap::error::ErrorKind;
-use glam::Vec2;
 
 use ppm_vk::internals::files::Writing;
 use ppm_vk::internals::film;
-use ppm_vk::internals::gather::{self, METHODS, Runs};
 use ppm_vk::{
-    Camera, EmissionChoice, Estimator, Hooks, Platform, PreparedScene, RenderConfig, Rendered, Sampler, Scene, Session,
-    Snapshots, State, Until, Warning,
+    Denoiser, EmissionChoice, Hooks, Platform, PreparedScene, Rendered, Scene, SceneFile, Session, Snapshots, State,
+    Warning,
 };
 
-use super::args::{Arguments, BackendChoice, RenderArguments};
+use super::args::RenderArguments;
 use super::denoise::denoise;
-use super::events::{Event, Events, Phase};
+use super::events::{Event, Events, Frame, Phase};
+use super::frames::{RenderFiles, Shot};
 use super::outputs::{all, check_outputs};
-use super::progress::{BUILDING, Meter, while_showing, with_prefix};
+use super::progress::{BUILDING, Meter, READING, while_showing, with_prefix};
 use super::scene::tell_remarks;
+use super::settings::{camera, choose_platform, config, default_output, until};
+use super::shutter::{Exposure, render_space};
 use super::watch::Watch;
 use super::{Outcome, advice, interrupt};
-
-/// Default number of iterations, without a time limit.
-const DEFAULT_ITERATIONS: u32 = 64;
 
 /// The render command.
 pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
@@ -37,7 +34,8 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
     let job = Job {
         arguments,
         path,
-        output: &output,
+        shots: Shot::all(arguments, &output),
+        file: Cell::new(None),
         platform,
         gather,
         watch: &watch,
@@ -51,67 +49,128 @@ pub fn render(arguments: &RenderArguments) -> Result<Outcome> {
 pub(super) struct Job<'a> {
     pub arguments: &'a RenderArguments,
     path: &'a Path,
-    pub output: &'a Path,
+    shots: Vec<Shot>,
+    /// The scene's file, between two frames.
+    file: Cell<Option<SceneFile>>,
     pub platform: Platform,
     gather: usize,
     pub watch: &'a Watch<'a>,
 }
 
+/// A shot that is done, and whose files are written.
+struct Made {
+    /// `None` if it was rendered in crops.
+    session: Option<Session>,
+    rendered: Arc<Rendered>,
+    frame: Option<u32>,
+}
+
 impl Job<'_> {
     fn run(&self) -> Result<Outcome> {
-        let Self {
-            arguments,
-            path,
-            output,
-            gather,
-            watch,
-            ref platform,
-        } = *self;
-        let events = &watch.events;
+        let Self { arguments, path, .. } = *self;
         // Before any work: fail early if a picture can't be written.
-        check_outputs(&arguments.read.inputs(path), outputs(arguments, output))?;
+        for shot in &self.shots {
+            check_outputs(&arguments.read.inputs(path), shot.files.all())?;
+        }
         let denoiser = arguments.denoise.open()?;
         interrupt::install()?;
+        let mut made: Option<Made> = None;
+        for shot in &self.shots {
+            if made.is_some() && interrupt::requested() {
+                break;
+            }
+            shot.begin(&self.watch.events);
+            let next = self.make(shot, denoiser.as_ref(), made);
+            made = Some(match shot.frame {
+                Some(Frame { frame, .. }) => next.with_context(|| format!("frame {frame}"))?,
+                None => next?,
+            });
+        }
+        Ok(if interrupt::requested() {
+            Outcome::Interrupted
+        } else {
+            Outcome::Done
+        })
+    }
 
+    /// Renders a shot and writes its files. `before`: the frame before it.
+    fn make(&self, shot: &Shot, denoiser: Option<&Denoiser>, before: Option<Made>) -> Result<Made> {
+        let Self {
+            arguments, path, watch, ..
+        } = *self;
+        let events = &watch.events;
         let quiet = arguments.quiet || arguments.has_events_on_stdout();
         events.begin(Phase::Load);
-        let scene = arguments.read.load(path, quiet)?;
+        let scene = while_showing(READING, quiet, || self.read(shot))?;
         let mut inputs = arguments.read.inputs(path);
         inputs.extend(scene.files.iter().map(PathBuf::as_path));
-        check_outputs(&inputs, outputs(arguments, output))?;
+        check_outputs(&inputs, shot.files.all())?;
         tell_remarks(&scene, events);
-        let camera = camera(arguments, &scene)?;
-        let config = config(arguments, gather, &camera);
+        let (camera, index) = camera(arguments, &scene)?;
+        let config = config(arguments, self.gather, &camera);
         events.begin(Phase::Build);
         let prepared = while_showing(BUILDING, quiet, || PreparedScene::new(&scene))?;
         for note in prepared.notes() {
-            events.note(note.clone());
+            events.note_once(note.clone());
         }
+        // A state is of this frame alone, and may have more iterations.
+        let is_still = |made: &Made| {
+            let session = made.session.as_ref();
+            shot.files.state.is_none()
+                && shot.shutter.is_none()
+                && session.is_some_and(|session| session.is_of(&prepared, &camera, &config))
+        };
+        let before = match before {
+            Some(made) if is_still(&made) => return self.repeat(shot, made),
+            before => before,
+        };
         let begins = |phase: ppm_vk::Phase| match phase {
             ppm_vk::Phase::Compile => events.begin(Phase::Compile),
             ppm_vk::Phase::Pilot => events.begin(Phase::Pilot),
             _ => {}
         };
-        let open = || Session::watched(&prepared, &camera, &config, platform, &begins);
-        let mut session = match open() {
-            Err(error) if error.is_picture_too_large() => return self.in_crops(&prepared, &camera, &config, error),
+        let expose = |session: Session| -> Result<Session> {
+            let Some(times) = shot.shutter else { return Ok(session) };
+            let motion = Exposure::new(&arguments.read, path, times, (&scene, index), &camera)?;
+            Ok(session.moving(&prepared, Box::new(motion))?)
+        };
+        let open = || expose(Session::watched(&prepared, &camera, &config, &self.platform, &begins)?);
+        let (session, before) = match before {
+            Some(Made {
+                session: Some(session),
+                rendered,
+                ..
+            }) => (
+                session
+                    .next(&prepared, &camera, &config, &begins)
+                    .map_err(anyhow::Error::from)
+                    .and_then(expose),
+                Some(rendered),
+            ),
+            Some(Made { rendered, .. }) => (open(), Some(rendered)),
+            None => (open(), None),
+        };
+        let frame = shot.frame.map(|frame| frame.frame);
+        let mut session = match session {
+            Err(error) if is_picture_too_large(&error) => {
+                let rendered = self.in_crops(shot, denoiser, (&prepared, &camera, &config), &error)?;
+                shot.tell_done(events, &rendered, before.as_deref(), None);
+                return Ok(Made {
+                    session: None,
+                    rendered,
+                    frame,
+                });
+            }
             session => session?,
         };
-        tell_warnings(events, session.warnings());
-        if let Some(state) = &arguments.state {
+        tell_once(events, session.warnings());
+        if let Some(state) = &shot.files.state {
             begin_with_state(events, &mut session, state, arguments.resume)?;
         }
-        if arguments.radius.is_none() {
-            say!("initial radius {:.6} scene units (automatic)", session.radius());
-        }
-        if config.emission == EmissionChoice::Aimed && !session.is_aimed() {
-            say!(
-                "photon paths start in proportion to the lights' power: aiming does not pay for its cost in this scene"
-            );
-        }
+        say_how(arguments, events, &session);
 
         let until = until(arguments);
-        let takers = watch.takers();
+        let takers = watch.takers(&shot.files);
         let meter = Meter::new(until, &session);
         let hooks = Hooks {
             stop: &interrupt::requested,
@@ -124,7 +183,7 @@ impl Job<'_> {
         };
         events.begin(Phase::Iterate);
         let mut rendered = session.render_with(until, &hooks);
-        if let Some(state) = arguments.state.as_deref().filter(|_| is_device_lost(&rendered)) {
+        if let Some(state) = shot.files.state.as_deref().filter(|_| is_device_lost(&rendered)) {
             events.warning(format!(
                 "the device was lost; the render goes on from {} on a device that is opened anew",
                 state.display()
@@ -135,47 +194,52 @@ impl Job<'_> {
             rendered = session.render_with(until, &hooks);
         }
         events.begin(Phase::Write);
-        let denoised = rendered
-            .as_mut()
-            .map_or(Ok(()), |rendered| denoise(rendered, denoiser.as_ref()));
+        let denoised = rendered.as_mut().map_or(Ok(()), |rendered| denoise(rendered, denoiser));
         let rendered = rendered.map(Arc::new);
         takers.end(rendered.as_ref().ok());
         let rendered = rendered?;
         tell_warnings(events, &rendered.warnings());
-        let state = arguments.state.as_ref().filter(|_| rendered.failure().is_none());
+        let state = shot.files.state.as_ref().filter(|_| rendered.failure().is_none());
         let state = state.map(|file| {
             session.state()?.write(file)?;
             events.written(file, session.iterations());
             Ok(())
         });
-        all([write_outputs(arguments, events, output, &rendered), denoised]
+        all([write_outputs(arguments, events, &shot.files, &rendered), denoised]
             .into_iter()
             .chain(state))?;
-        Ok(if interrupt::requested() {
-            Outcome::Interrupted
-        } else {
-            Outcome::Done
+        shot.tell_done(events, &rendered, before.as_deref(), None);
+        Ok(Made {
+            session: Some(session),
+            rendered,
+            frame,
         })
     }
-}
 
-fn camera(arguments: &RenderArguments, scene: &Scene) -> Result<Camera> {
-    let mut camera = scene.cameras[scene.camera_index(arguments.camera.as_deref())?].clone();
-    if let Some(radius) = arguments.aperture {
-        camera.lens = Some(scene.lens(&camera, radius, arguments.focus)?);
+    /// Reads the scene of a shot: that of the middle of the time in which the shutter is open.
+    fn read(&self, shot: &Shot) -> Result<Scene> {
+        let read = &self.arguments.read;
+        let mut file = self.file.take().map_or_else(|| read.open(self.path), Ok)?;
+        let scene = match shot.shutter {
+            None => read.scene_at(&mut file, shot.time, None)?,
+            Some([open, close]) => {
+                let space = render_space(&mut file, [open, close])?;
+                read.scene_at(&mut file, Some(0.5 * (open + close)), Some(space))?
+            }
+        };
+        if self.shots.len() > 1 {
+            self.file.set(Some(file));
+        }
+        Ok(scene)
     }
-    if let Some([x, y]) = arguments.shift {
-        camera.shift = Vec2::new(x, y);
-    }
-    Ok(camera)
-}
 
-pub(super) fn until(arguments: &RenderArguments) -> Until {
-    let endless = arguments.time.is_none() && arguments.target_error.is_none();
-    Until {
-        iterations: arguments.iterations.or_else(|| endless.then_some(DEFAULT_ITERATIONS)),
-        time: arguments.time,
-        error: arguments.target_error,
+    /// Writes the picture of the frame before: nothing has moved since, and another render would have the same bits.
+    fn repeat(&self, shot: &Shot, made: Made) -> Result<Made> {
+        let events = &self.watch.events;
+        events.begin(Phase::Write);
+        write_outputs(self.arguments, events, &shot.files, &made.rendered)?;
+        shot.tell_done(events, &made.rendered, Some(&made.rendered), made.frame);
+        Ok(made)
     }
 }
 
@@ -195,6 +259,11 @@ fn begin_with_state(events: &Events, session: &mut Session, file: &Path, resume:
     Ok(())
 }
 
+fn is_picture_too_large(error: &anyhow::Error) -> bool {
+    let error = error.downcast_ref::<ppm_vk::Error>();
+    error.is_some_and(ppm_vk::Error::is_picture_too_large)
+}
+
 fn is_device_lost(rendered: &ppm_vk::Result<Rendered>) -> bool {
     let failure = |rendered: &Rendered| rendered.failure().is_some_and(|failure| failure.error.is_device_lost());
     rendered.as_ref().map_or_else(ppm_vk::Error::is_device_lost, failure)
@@ -207,16 +276,16 @@ fn is_device_lost(rendered: &ppm_vk::Result<Rendered>) -> bool {
 pub(super) fn write_outputs(
     arguments: &RenderArguments,
     events: &Events,
-    output: &Path,
+    files: &RenderFiles,
     rendered: &Rendered,
 ) -> Result<()> {
     let _writing = Writing::begin();
     let iterations = rendered.iterations();
     let pictures = arguments
-        .picture_files(output)
+        .picture_files(files)
         .write(rendered, |file| events.written(file, iterations));
     if pictures[0].is_ok() {
-        say_rendered(output, rendered);
+        say_rendered(&files.exr, rendered);
     }
     let (profile, subject) = (rendered.profile(), rendered.subject());
     let json = |file: &Option<PathBuf>, value: &dyn Fn() -> serde_json::Value| {
@@ -226,8 +295,8 @@ pub(super) fn write_outputs(
     let written = [
         rendered.failure().map(|failure| Err(advice::of_failure(failure))),
         arguments.profile.then(|| print_profile(arguments, rendered)),
-        json(&arguments.profile_json, &|| profile.json(subject)),
-        json(&arguments.trace, &|| profile.trace(subject)),
+        json(&files.profile_json, &|| profile.json(subject)),
+        json(&files.trace, &|| profile.trace(subject)),
     ];
     all(pictures.into_iter().chain(written.into_iter().flatten()))
 }
@@ -246,14 +315,39 @@ fn print_profile(arguments: &RenderArguments, rendered: &Rendered) -> Result<()>
     Ok(())
 }
 
+/// Tells of warnings about a picture.
 pub(super) fn tell_warnings(events: &Events, warnings: &[Warning]) {
     for warning in warnings {
-        let text = advice::of_warning(warning);
-        if warning.is_slight() {
-            events.note(text);
-        } else {
-            events.warning(text);
-        }
+        tell(warning, |text| events.note(text), |text| events.warning(text));
+    }
+}
+
+/// Tells of those that were not told of another frame.
+pub(super) fn tell_once(events: &Events, warnings: &[Warning]) {
+    for warning in warnings {
+        tell(warning, |text| events.note_once(text), |text| events.warning_once(text));
+    }
+}
+
+/// Tells of a warning, by one of two ways.
+fn tell(warning: &Warning, as_note: impl FnOnce(String), as_warning: impl FnOnce(String)) {
+    let text = advice::of_warning(warning);
+    if warning.is_slight() {
+        as_note(text);
+    } else {
+        as_warning(text);
+    }
+}
+
+/// Says how photons are gathered and start.
+fn say_how(arguments: &RenderArguments, events: &Events, session: &Session) {
+    if arguments.radius.is_none() {
+        say!("initial radius {:.6} scene units (automatic)", session.radius());
+    }
+    let by_power =
+        "photon paths start in proportion to the lights' power: aiming does not pay for its cost in this scene";
+    if session.config().emission == EmissionChoice::Aimed && !session.is_aimed() && events.is_new(by_power) {
+        say!("{by_power}");
     }
 }
 
@@ -281,86 +375,4 @@ fn say_rendered(output: &Path, rendered: &Rendered) {
 
 fn write_json(file: &Path, value: &serde_json::Value) -> Result<()> {
     Ok(film::write_whole(file, &serde_json::to_vec_pretty(value)?)?)
-}
-
-/// Backend and gather method: if the user names one of them, the other follows.
-fn choose_platform(arguments: &RenderArguments) -> (Platform, usize) {
-    let of_method = |method: usize| match METHODS[method].runs {
-        Runs::Device { .. } => BackendChoice::Vulkan,
-        Runs::CpuKdTree | Runs::CpuNaive => BackendChoice::Cpu,
-    };
-    let (backend, method) = match (arguments.backend, arguments.gather) {
-        (backend, Some(method)) => (backend.unwrap_or(of_method(method)), method),
-        (Some(BackendChoice::Cpu), None) => (BackendChoice::Cpu, gather::default_cpu_method()),
-        (_, None) => (BackendChoice::Vulkan, gather::default_method()),
-    };
-    let conflict = if backend != of_method(method) {
-        Some("this --gather does not run on this --backend; leave one of them out")
-    } else if arguments.cell_photons.is_some() && METHODS[method].name != "cluster-grid" {
-        Some("--cell-photons needs --gather cluster-grid")
-    } else if arguments.aperture.is_some() && arguments.estimator == Estimator::Ppm {
-        Some("--estimator ppm finds visible points once: it has no --aperture")
-    } else if arguments.emission == Some(EmissionChoice::Aimed) && arguments.estimator == Estimator::Ppm {
-        Some("--estimator ppm keeps all photons: its paths start by --emission power")
-    } else if arguments.aov.iter().any(|layer| layer.needs_device()) && backend == BackendChoice::Cpu {
-        Some("--backend cpu has the layers samples and error alone")
-    } else if arguments.aov.iter().any(|layer| layer.needs_device()) && !arguments.part.is_whole() {
-        Some("parts have no layers but samples and error: ppm-vk merge would leave them out")
-    } else if backend == BackendChoice::Cpu && arguments.crop.is_some() {
-        Some("--backend cpu renders whole pictures: it has no --crop")
-    } else if backend == BackendChoice::Cpu && arguments.device.is_some() {
-        Some("the CPU backend has no --device")
-    } else {
-        None
-    };
-    if let Some(text) = conflict {
-        Arguments::command().error(ErrorKind::ArgumentConflict, text).exit();
-    }
-    let platform = match backend {
-        BackendChoice::Vulkan => Platform::Vulkan(arguments.device.clone()),
-        BackendChoice::Cpu => Platform::Cpu,
-    };
-    (platform, method)
-}
-
-fn config(arguments: &RenderArguments, gather: usize, camera: &Camera) -> RenderConfig {
-    RenderConfig {
-        resolution: arguments.resolution.unwrap_or(RenderConfig::of(camera).resolution),
-        crop: arguments.crop,
-        photons: arguments.photons,
-        estimator: arguments.estimator,
-        direct: arguments.direct,
-        alpha: arguments.alpha,
-        radius: arguments.radius,
-        gather: Some(gather),
-        cell_photons: arguments.cell_photons,
-        accel: arguments.accel,
-        triangle_test: arguments.triangle_test,
-        max_depth: arguments.max_depth,
-        drop_unwanted: true,
-        aims_anyway: false,
-        emission: arguments.emission.unwrap_or(EmissionChoice::of(arguments.estimator)),
-        sampler: arguments.sampler.unwrap_or(Sampler::of(arguments.estimator)),
-        seed: arguments.seed,
-        filter: arguments.filter,
-        layers: arguments.aov.iter().copied().collect(),
-        part: arguments.part,
-    }
-}
-
-/// The scene's name with `.exr`, in the current folder.
-fn default_output(scene: &Path) -> PathBuf {
-    let mut name = scene.file_stem().unwrap_or(scene.as_os_str()).to_owned();
-    name.push(".exr");
-    PathBuf::from(name)
-}
-
-fn outputs<'a>(arguments: &'a RenderArguments, output: &'a Path) -> impl Iterator<Item = &'a Path> {
-    let others = [
-        &arguments.png,
-        &arguments.profile_json,
-        &arguments.trace,
-        &arguments.state,
-    ];
-    std::iter::once(output).chain(others.into_iter().filter_map(|file| file.as_deref()))
 }

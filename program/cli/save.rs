@@ -1,6 +1,6 @@
 //! Pictures and states that are written while a render goes on.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -10,6 +10,7 @@ use anyhow::{Error, Result};
 use super::advice;
 use super::args::RenderArguments;
 use super::events::Events;
+use super::frames::RenderFiles;
 use super::outputs::{PictureFiles, all};
 use super::takers::{Mailbox, Pace, Taker};
 use ppm_vk::{Rendered, Snapshot, Wanted};
@@ -34,13 +35,18 @@ pub struct Saver {
 
 impl Saver {
     /// For a render with these arguments; `None` if it saves nothing.
-    pub fn new(arguments: &RenderArguments, output: &Path, events: &Arc<Events>) -> Option<Self> {
+    pub fn new(arguments: &RenderArguments, files: &RenderFiles, events: &Arc<Events>) -> Option<Self> {
         let every = arguments
             .save_every
-            .or(arguments.state.is_some().then_some(DEFAULT_EVERY))?;
+            .or(files.state.is_some().then_some(DEFAULT_EVERY))?;
+        let wanted = if files.state.is_some() {
+            Wanted::State
+        } else {
+            Wanted::Picture
+        };
         let files = Files {
-            pictures: arguments.picture_files(output),
-            state: arguments.state.clone(),
+            pictures: arguments.picture_files(files),
+            state: files.state.clone(),
         };
         let snapshots = Arc::new(Mailbox::default());
         let (incoming, events) = (snapshots.clone(), events.clone());
@@ -56,11 +62,7 @@ impl Saver {
         });
         Some(Self {
             pace: Pace::every(every),
-            wanted: if arguments.state.is_some() {
-                Wanted::State
-            } else {
-                Wanted::Picture
-            },
+            wanted,
             snapshots,
             thread,
         })

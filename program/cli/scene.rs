@@ -10,7 +10,7 @@ use super::args::{choice, number, positive};
 use super::events::Events;
 use super::progress::{READING, while_showing};
 use ppm_vk::internals::loader::MEMORY_LIMIT;
-use ppm_vk::{Environment, LightUnits, LoadOptions, Scene};
+use ppm_vk::{Environment, LightUnits, LoadOptions, Normalisation, Scene, SceneFile};
 
 /// Arguments for reading a scene.
 #[derive(Debug, Args)]
@@ -53,7 +53,7 @@ pub struct SceneArguments {
     light_radius: f64,
     /// Apply the scene's animations at this time, in seconds [default: everything at rest].
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
-    frame_time: Option<f64>,
+    pub frame_time: Option<f64>,
     /// Maximum memory of the scene while it is read: buffers, geometry, images, environment. A small file can request any amount
     /// [default: 2].
     #[arg(long, value_name = "GIB", allow_negative_numbers = true, value_parser = positive)]
@@ -87,6 +87,25 @@ impl SceneArguments {
 
     /// Reads the scene.
     pub fn load(&self, path: &Path, quiet: bool) -> Result<Scene> {
+        while_showing(READING, quiet, || {
+            self.scene_at(&mut self.open(path)?, self.frame_time, None)
+        })
+    }
+
+    /// The scene at a time of its animations, in a render space.
+    pub fn scene_at(
+        &self,
+        file: &mut SceneFile,
+        time: Option<f64>,
+        render_space: Option<Normalisation>,
+    ) -> Result<Scene> {
+        let mut scene = file.at(time, render_space)?;
+        self.place_environment(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Opens the scene's file.
+    pub fn open(&self, path: &Path) -> Result<SceneFile> {
         let memory_limit = self
             .memory_limit
             .map_or(MEMORY_LIMIT, |gibibytes| (gibibytes * f64::from(1 << 30)) as u64);
@@ -106,9 +125,7 @@ impl SceneArguments {
             sun_angle: self.sun_angle,
             light_radius: self.light_radius,
         };
-        let mut scene = while_showing(READING, quiet, || Scene::load_with(path, options))?;
-        self.place_environment(&mut scene)?;
-        Ok(scene)
+        Ok(SceneFile::open(path, options)?)
     }
 
     /// Scales and rotates the environment, also the default one of a scene without lights.
@@ -147,10 +164,10 @@ pub fn say_remarks(scene: &Scene) {
 /// Tells of them.
 pub fn tell_remarks(scene: &Scene, events: &Events) {
     for note in &scene.notes {
-        events.note(advice::of_remark(note));
+        events.note_once(advice::of_remark(note));
     }
     for warning in &scene.warnings {
-        events.warning(advice::of_remark(warning));
+        events.warning_once(advice::of_remark(warning));
     }
 }
 

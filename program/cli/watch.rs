@@ -7,6 +7,7 @@ use anyhow::Result;
 
 use super::args::RenderArguments;
 use super::events::{Event, Events, JsonLines, Listener, ProgressFormat};
+use super::frames::RenderFiles;
 use super::progress::Bar;
 use super::save::Saver;
 use super::serve::{self, Board, Page};
@@ -55,10 +56,10 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Those who take pictures.
-    pub fn takers(&self) -> Takers {
+    /// Those who take pictures, of a render to these files.
+    pub fn takers(&self, files: &RenderFiles) -> Takers {
         let mut takers = Takers::default();
-        if let Some(saver) = Saver::new(self.arguments, &self.output, &self.events) {
+        if let Some(saver) = Saver::new(self.arguments, files, &self.events) {
             takers.add(saver);
         }
         if let Some(address) = &self.arguments.view {

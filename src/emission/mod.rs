@@ -7,11 +7,13 @@
 //! photon by power.
 
 mod learning;
+mod motion;
 mod path_value;
 mod strata;
 mod table;
 mod targets;
 
 pub use learning::{Aim, counted_paths, is_learned_from};
+pub use motion::aims_alike;
 pub use path_value::PathValue;
 pub use table::{DIMENSIONS, Table, light_of};

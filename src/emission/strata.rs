@@ -92,7 +92,7 @@ fn share_out(strata: &mut [Stratum], targets: &Targets, probability: f64) {
 }
 
 /// Whether a light is distant.
-fn is_distant(light: &Light) -> bool {
+pub(super) fn is_distant(light: &Light) -> bool {
     [DIRECTIONAL_LIGHT, ENVIRONMENT_LIGHT].contains(&light.kind)
 }
 

@@ -42,18 +42,7 @@ pub(super) struct Targets {
 
 /// Finds the targets of a scene, given some visible points.
 pub(super) fn targets(scene: &PackedScene, points: &[VisiblePoint]) -> Targets {
-    let own = own_triangles(scene).flat_map(corners_of);
-    let placed = scene.instances.iter().flat_map(|instance| {
-        let placement = Placement { rows: instance.rows };
-        shared_triangles(scene, instance.first_triangle, instance.triangle_count)
-            .flat_map(corners_of)
-            .map(move |corner| placement.point(corner.as_vec3()).as_dvec3())
-    });
-    let radius2 = own.chain(placed).map(DVec3::length_squared).fold(0.0, f64::max);
-    let whole = Sphere {
-        centre: DVec3::ZERO,
-        radius: radius2.sqrt() * Sphere::MARGIN,
-    };
+    let whole = around(scene);
     let is_small = |sphere: &Sphere| sphere.radius < LARGE * whole.radius;
     let specular = clustered(specular_objects(scene)).into_iter().filter(is_small);
     let target = |specular| move |sphere| Target { sphere, specular };
@@ -76,6 +65,22 @@ pub(super) fn targets(scene: &PackedScene, points: &[VisiblePoint]) -> Targets {
         spheres,
         view,
         scene: whole,
+    }
+}
+
+/// The sphere around a scene, a little larger than that.
+pub(super) fn around(scene: &PackedScene) -> Sphere {
+    let own = own_triangles(scene).flat_map(corners_of);
+    let placed = scene.instances.iter().flat_map(|instance| {
+        let placement = Placement { rows: instance.rows };
+        shared_triangles(scene, instance.first_triangle, instance.triangle_count)
+            .flat_map(corners_of)
+            .map(move |corner| placement.point(corner.as_vec3()).as_dvec3())
+    });
+    let radius2 = own.chain(placed).map(DVec3::length_squared).fold(0.0, f64::max);
+    Sphere {
+        centre: DVec3::ZERO,
+        radius: radius2.sqrt() * Sphere::MARGIN,
     }
 }
 

@@ -146,6 +146,18 @@ impl Device {
         copied
     }
 
+    /// Frees all buffers and acceleration structures; compiled kernels stay.
+    pub fn clear(&mut self) {
+        self.wait_until_idle();
+        self.descriptors.free(&self.context);
+        if let Some(acceleration) = self.acceleration.take() {
+            acceleration.free(&self.context);
+        }
+        for (_, buffer) in self.buffers.drain() {
+            buffer.free(&self.context);
+        }
+    }
+
     /// Bytes of all buffers and acceleration structures.
     pub fn bytes(&self) -> u64 {
         let buffers: u64 = self.buffers.values().map(|buffer| buffer.bytes).sum();

@@ -19,7 +19,7 @@ mod variants;
 pub use self::file::budget::MEMORY_LIMIT;
 pub use self::light_units::LightUnits;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
@@ -33,7 +33,7 @@ use self::light::punctual_lights;
 use self::mesh::{assembly, solid};
 use self::texture::TextureReader;
 use crate::error::{Error, Result};
-use crate::scene::{Environment, LoadChoice, Remark, Scene, Surface, framed_on};
+use crate::scene::{Environment, LoadChoice, Material, Normalisation, Remark, Scene, Surface, Textures, framed_on};
 use crate::text::{quote, shorten};
 
 /// Options for loading a scene.
@@ -79,15 +79,59 @@ impl Scene {
     ///
     /// As [`Scene::load`].
     pub fn load_with(path: &Path, options: LoadOptions) -> Result<Self> {
+        let time = options.frame_time;
+        SceneFile::open(path, options)?.at(time, None)
+    }
+}
+
+/// A scene's file, to be read at several times of its animations.
+pub struct SceneFile {
+    path: PathBuf,
+    document: Document,
+    /// Names of its material variants.
+    variants: Vec<String>,
+    options: LoadOptions,
+    /// What there was to say when it was opened.
+    warnings: Vec<Remark>,
+    refused: FirstRefusal,
+    surfaces: Option<Surfaces>,
+}
+
+/// Materials of a file and their textures, which no animation changes.
+struct Surfaces {
+    /// Which materials objects have.
+    used: Vec<bool>,
+    materials: Vec<Material>,
+    textures: Textures,
+}
+
+impl SceneFile {
+    /// Opens a glTF file, with the buffers that it refers to.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::load`].
+    pub fn open(path: &Path, options: LoadOptions) -> Result<Self> {
         let budget = Budget::new(options.memory_limit.unwrap_or(MEMORY_LIMIT));
         let refused = budget.refused();
-        load(path, options, budget).map_err(|what| failure(path, what, &refused))
+        open(path, options, budget).map_err(|what| failure(path, what, &refused))
+    }
+
+    /// The scene at a time of its animations, in seconds, or at rest. `render_space`: that of another time of the file, or `None` for
+    /// one that fits its bounds.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::load`].
+    pub fn at(&mut self, time: Option<f64>, render_space: Option<Normalisation>) -> Result<Scene> {
+        let scene = scene_at(self, time, render_space);
+        scene.map_err(|what| failure(&self.path, what, &self.refused))
     }
 }
 
 /// A failure: out of memory, or another one.
 fn failure(path: &Path, what: String, refused: &FirstRefusal) -> Error {
-    match &*refused.borrow() {
+    match refused.get() {
         Some(refusal) if what.contains(&refusal.what) => Error::Memory {
             path: path.to_owned(),
             what,
@@ -97,9 +141,9 @@ fn failure(path: &Path, what: String, refused: &FirstRefusal) -> Error {
     }
 }
 
-fn load(path: &Path, options: LoadOptions, budget: Budget) -> Check<Scene> {
+fn open(path: &Path, options: LoadOptions, budget: Budget) -> Check<SceneFile> {
     let mut warnings = Warnings::default();
-    let mut notes = Vec::new();
+    let refused = budget.refused();
     if let Some(environment) = &options.environment {
         budget.take(environment.bytes(), "the environment")?;
     }
@@ -108,26 +152,65 @@ fn load(path: &Path, options: LoadOptions, budget: Budget) -> Check<Scene> {
     if let Some(wanted) = &options.variant {
         variants::choose(&mut document.root, &variants, wanted)?;
     }
-    let document = document;
+    Ok(SceneFile {
+        path: path.to_owned(),
+        document,
+        variants,
+        options,
+        warnings: warnings.into_lines(),
+        refused,
+        surfaces: None,
+    })
+}
+
+fn scene_at(file: &mut SceneFile, time: Option<f64>, render_space: Option<Normalisation>) -> Check<Scene> {
+    let SceneFile {
+        path,
+        document,
+        variants,
+        options,
+        warnings: of_file,
+        surfaces,
+        ..
+    } = file;
+    let mut warnings = Warnings::default();
+    for warning in of_file.iter() {
+        warnings.add(warning.clone());
+    }
+    let mut notes = Vec::new();
     let root = &document.root;
-    let pose = match options.frame_time {
-        Some(time) => Pose::at(&document, time, &mut warnings)?,
+    let pose = match time {
+        Some(time) => Pose::at(document, time, &mut warnings)?,
         None => Pose::default(),
     };
     let nodes = place_nodes(root, &pose, options.scene.as_deref(), &mut notes)?;
-    warn_of_ignored(&document, &options, &mut warnings);
+    warn_of_ignored(document, time, &mut warnings);
 
-    let instances = assembly::instances(&document, &nodes, &pose, &mut warnings)?;
-    let mut geometry = assembly::assemble(&document, &instances, &mut warnings)?;
+    let instances = assembly::instances(document, &nodes, &pose, &mut warnings)?;
+    let mut geometry = assembly::assemble(document, &instances, render_space, &mut warnings)?;
 
     let mut used = vec![false; root.materials.len() + 1];
     for object in &geometry.objects {
         used[object.material as usize] = true;
     }
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut textures = TextureReader::new(&document, folder);
-    let mut materials = material::materials(root, &used, &mut textures, &mut warnings)?;
+    let known = surfaces.take().filter(|surfaces| surfaces.used == used);
+    let surfaces = match known {
+        Some(known) => surfaces.insert(known),
+        None => {
+            let mut textures = TextureReader::new(document, folder);
+            let materials = material::materials(root, &used, &mut textures, &mut warnings)?;
+            surfaces.insert(Surfaces {
+                used: used.clone(),
+                materials,
+                textures: textures.finish(),
+            })
+        }
+    };
+    let mut materials = surfaces.materials.clone();
     document.budget.settle()?;
+    // For another time.
+    document.budget.give_back(geometry.bytes());
     if used.last() == Some(&false) {
         materials.pop();
     }
@@ -144,7 +227,7 @@ fn load(path: &Path, options: LoadOptions, budget: Budget) -> Check<Scene> {
     }
 
     let cameras = camera::cameras(root, &nodes, geometry.normalisation, &mut warnings)?;
-    let lights = punctual_lights(root, &nodes, geometry.normalisation, &options, &mut warnings)?;
+    let lights = punctual_lights(root, &nodes, geometry.normalisation, options, &mut warnings)?;
     if !lights.is_empty() {
         notes.extend(options.light_units.note(root));
     }
@@ -159,12 +242,12 @@ fn load(path: &Path, options: LoadOptions, budget: Budget) -> Check<Scene> {
         objects: geometry.objects,
         materials,
         lights,
-        environment: options.environment,
-        textures: textures.finish(),
+        environment: options.environment.clone(),
+        textures: surfaces.textures.clone(),
         cameras,
         normalisation: geometry.normalisation,
         dropped_triangles: geometry.dropped_triangles,
-        files: std::iter::once(path.to_owned())
+        files: std::iter::once(path.clone())
             .chain(referred_files(root, folder))
             .collect(),
         variants: variants.iter().map(|name| shorten(name)).collect(),
@@ -196,7 +279,7 @@ fn load(path: &Path, options: LoadOptions, budget: Budget) -> Check<Scene> {
 }
 
 /// Warns of what applies to the file as a whole.
-fn warn_of_ignored(document: &Document, options: &LoadOptions, warnings: &mut Warnings) {
+fn warn_of_ignored(document: &Document, time: Option<f64>, warnings: &mut Warnings) {
     let root = &document.root;
     for extension in &root.extensions_used {
         if !extensions::is_supported(extension) {
@@ -207,7 +290,7 @@ fn warn_of_ignored(document: &Document, options: &LoadOptions, warnings: &mut Wa
             ));
         }
     }
-    if !root.animations.is_empty() && options.frame_time.is_none() {
+    if !root.animations.is_empty() && time.is_none() {
         warnings.add(Remark::with(
             LoadChoice::FrameTime,
             "its animations need a time; everything is rendered at rest",

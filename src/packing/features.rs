@@ -113,6 +113,13 @@ impl SceneFeatures {
         features
     }
 
+    /// Those of this scene or of another.
+    #[must_use]
+    pub fn with(self, other: Self) -> Self {
+        let [these, those] = [self, other].map(Self::constants);
+        Self::of_constants(std::array::from_fn(|index| these[index].1 || those[index].1))
+    }
+
     /// The lobes that the BSDFs of visible points can have.
     pub fn visible_lobes(self) -> VisibleLobes {
         let constants = self.constants();

@@ -15,6 +15,7 @@ mod near_lights;
 mod nesting;
 pub mod object_grid;
 mod part;
+mod refit;
 mod sphere;
 
 pub use emissive::EmissiveTriangle;
@@ -32,6 +33,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3, Vec4};
 
+use self::bvh::Bvh;
 use self::near_lights::NearLights;
 use self::nesting::Nesting;
 use self::object_grid::object_grids;
@@ -85,6 +87,8 @@ pub struct PackedScene {
     pub object_cells: u32,
     /// Index in [`Scene::triangles`] of each packed triangle.
     pub order: Vec<u32>,
+    /// Ranges of shared triangles in that order, one for each primitive.
+    pub shared: Vec<Range<u32>>,
     /// Render units per scene unit.
     pub scale: f64,
     /// Probability that direct light is sampled by a direction of the BSDF instead of a light's point, near a light.
@@ -107,12 +111,38 @@ impl PackedScene {
     /// # Errors
     /// A text, if there are too many triangles, or too many materials for glass that overlaps.
     pub fn new(scene: &Scene) -> Result<Self, String> {
+        let shared = shared_triangles(scene);
+        let bvh = bvh::build(scene, &shared.ranges, &shared.placed)?;
+        Self::of(scene, shared, bvh)
+    }
+
+    /// The scene at another time of its animations: the hierarchy is refitted if it has the same triangles.
+    ///
+    /// # Errors
+    /// As [`PackedScene::new`].
+    pub fn moved(&self, scene: &Scene) -> Result<Self, String> {
+        let shared = shared_triangles(scene);
+        let is_alike = shared.placed.len() == self.instances.len()
+            && refit::is_of(&self.order, &self.shared, scene, &shared.ranges);
+        let bvh = if is_alike {
+            let before = Bvh {
+                records: self.bvh.clone(),
+                order: self.order.clone(),
+                shared: self.shared.clone(),
+            };
+            refit::refit(before, scene, &shared.placed)
+        } else {
+            bvh::build(scene, &shared.ranges, &shared.placed)?
+        };
+        Self::of(scene, shared, bvh)
+    }
+
+    fn of(scene: &Scene, shared: SharedTriangles, bvh: Bvh) -> Result<Self, String> {
         let SharedTriangles {
-            ranges,
             materials: shared_materials,
             placed,
-        } = shared_triangles(scene);
-        let bvh = bvh::build(scene, &ranges, &placed)?;
+            ..
+        } = shared;
         let corners: Vec<[Vec3; 3]> = bvh.order.iter().map(|&index| scene.corners_of(index)).collect();
         let light_table = light_table::lights(scene, &bvh.order);
         let own_triangles = bvh.shared.first().map_or(bvh.order.len() as u32, |shared| shared.start);
@@ -215,6 +245,7 @@ impl PackedScene {
                 .map_or_else(environment_table::no_table, Environment::table),
             bvh: bvh.records,
             order: bvh.order,
+            shared: bvh.shared,
             scale: scene.normalisation.scale,
         })
     }

@@ -4,6 +4,7 @@ mod aim;
 mod fitting;
 mod iteration;
 mod memory;
+mod pose;
 mod radii;
 mod saved;
 mod stages;
@@ -182,6 +183,16 @@ impl Renderer {
         renderer.device.compile(&iteration)?;
         renderer.device.compile(&picture)?;
         Ok(renderer)
+    }
+
+    /// The device with the kernels that are compiled, for another render.
+    ///
+    /// # Errors
+    /// As [`Backend::iterate`].
+    pub fn into_device(mut self) -> Result<Device> {
+        self.complete_ahead()?;
+        self.device.clear();
+        Ok(self.device)
     }
 
     fn stages(&self) -> Stages<'_> {

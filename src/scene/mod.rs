@@ -26,6 +26,9 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
+/// What moves may be a little farther away at times between those that are known.
+const MARGIN: f64 = 1.0 + 1.0 / 16.0;
+
 /// The map from world space to render space: `render = (world − centre) · scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normalisation {
@@ -46,6 +49,27 @@ impl Default for Normalisation {
 }
 
 impl Normalisation {
+    /// One in whose render space all scenes lie that lie in those of `all`, and a little more if these are several.
+    pub fn around(all: &[Self]) -> Self {
+        let first = all.first().copied().unwrap_or_default();
+        if all.iter().all(|other| *other == first) {
+            return first;
+        }
+        let half = |normalisation: &Self| DVec3::splat(normalisation.scale.recip());
+        let lower = all
+            .iter()
+            .map(|one| one.centre - half(one))
+            .fold(DVec3::INFINITY, DVec3::min);
+        let upper = all
+            .iter()
+            .map(|one| one.centre + half(one))
+            .fold(DVec3::NEG_INFINITY, DVec3::max);
+        Self {
+            centre: 0.5 * lower + 0.5 * upper,
+            scale: (0.5 * upper - 0.5 * lower).max_element().recip() / MARGIN,
+        }
+    }
+
     /// The point of render space that is `world` in world space.
     pub fn to_render(self, world: DVec3) -> Vec3 {
         ((world - self.centre) * self.scale).as_vec3()

@@ -1,10 +1,12 @@
 //! The public interface for rendering: a scene in, pictures out.
 
 mod crops;
+mod flicker;
 mod layers;
 mod merge;
 mod prepared;
 mod rendered;
+mod shutter;
 mod snapshot;
 mod state;
 mod until;
@@ -12,9 +14,11 @@ mod warning;
 mod work;
 
 pub use crops::{Mosaic, crops};
+pub use flicker::Flicker;
 pub use merge::Merge;
 pub use prepared::PreparedScene;
 pub use rendered::{Failure, Rendered};
+pub use shutter::Motion;
 pub use snapshot::{Snapshot, Snapshots, Wanted};
 pub use state::State;
 pub use until::{Progress, Until};
@@ -35,6 +39,7 @@ use crate::scene::Camera;
 use crate::{cpu, pipeline};
 use layers::SceneNames;
 use rendered::About;
+use shutter::Moving;
 use state::Identity;
 use work::Work;
 
@@ -78,6 +83,7 @@ impl Default for Hooks<'_> {
 
 enum Renderer {
     Device(Box<pipeline::Renderer>),
+    Moving(Box<Moving>),
     Cpu(Box<cpu::Renderer>),
 }
 
@@ -132,27 +138,62 @@ impl Session {
         platform: &Platform,
         begins: &dyn Fn(Phase),
     ) -> Result<Self> {
-        let packed = scene.packed();
-        let is_cpu = *platform == Platform::Cpu;
-        let config = RenderConfig {
-            gather: config
-                .gather
-                .or(Some(if is_cpu { default_cpu_method() } else { default_method() })),
-            ..config.clone()
-        };
-        let renderer = match platform {
+        let device = match platform {
             Platform::Vulkan(device) => {
                 begins(Phase::Compile);
-                let device = Device::open(device.as_deref())?;
-                Renderer::Device(Box::new(pipeline::Renderer::watched(
-                    device,
-                    packed,
-                    camera,
-                    config.clone(),
-                    begins,
-                )?))
+                Some(Device::open(device.as_deref())?)
             }
-            Platform::Cpu => {
+            Platform::Cpu => None,
+        };
+        Self::on(device, scene, camera, config, begins)
+    }
+
+    /// A session of another scene, such as the next frame of an animation, where this one is: kernels that both need are compiled
+    /// already. It learns anew, so its pictures have the bits of [`Session::new`].
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn next(
+        self,
+        scene: &PreparedScene,
+        camera: &Camera,
+        config: &RenderConfig,
+        begins: &dyn Fn(Phase),
+    ) -> Result<Self> {
+        let device = match self.renderer {
+            Renderer::Device(renderer) => {
+                begins(Phase::Compile);
+                Some(renderer.into_device()?)
+            }
+            Renderer::Moving(moving) => {
+                begins(Phase::Compile);
+                Some(moving.renderer.into_device()?)
+            }
+            Renderer::Cpu(_) => None,
+        };
+        Self::on(device, scene, camera, config, begins)
+    }
+
+    /// On a device, or on the CPU.
+    fn on(
+        device: Option<Device>,
+        scene: &PreparedScene,
+        camera: &Camera,
+        config: &RenderConfig,
+        begins: &dyn Fn(Phase),
+    ) -> Result<Self> {
+        let packed = scene.packed();
+        let is_cpu = device.is_none();
+        let config = with_method(config, is_cpu);
+        let renderer = match device {
+            Some(device) => Renderer::Device(Box::new(pipeline::Renderer::watched(
+                device,
+                packed,
+                camera,
+                config.clone(),
+                begins,
+            )?)),
+            None => {
                 if let Some(crop) = config.crop {
                     let what = format!("{crop}: the CPU backend renders whole pictures");
                     return Err(Error::setting(Setting::Crop, what));
@@ -181,6 +222,14 @@ impl Session {
             scale: packed.scale,
             spent: Duration::ZERO,
         })
+    }
+
+    /// Whether a session of this scene, camera and settings would render the same picture.
+    pub fn is_of(&self, scene: &PreparedScene, camera: &Camera, config: &RenderConfig) -> bool {
+        let is_cpu = matches!(self.renderer, Renderer::Cpu(_));
+        // Layers tell of places in the world, which the identity does not know.
+        self.names.normalisation == scene.names().normalisation
+            && self.identity == Identity::of(scene, camera, &with_method(config, is_cpu), is_cpu)
     }
 
     /// Renders until a limit is reached.
@@ -318,8 +367,18 @@ impl Session {
     pub fn on_device(&mut self) -> Option<&mut pipeline::Renderer> {
         match &mut self.renderer {
             Renderer::Device(renderer) => Some(renderer),
+            Renderer::Moving(moving) => Some(&mut moving.renderer),
             Renderer::Cpu(_) => None,
         }
+    }
+}
+
+/// The settings with a gather method.
+fn with_method(config: &RenderConfig, is_cpu: bool) -> RenderConfig {
+    let default = if is_cpu { default_cpu_method } else { default_method };
+    RenderConfig {
+        gather: config.gather.or_else(|| Some(default())),
+        ..config.clone()
     }
 }
 
@@ -327,6 +386,7 @@ impl Renderer {
     fn backend(&self) -> &dyn Backend {
         match self {
             Self::Device(renderer) => renderer.as_ref(),
+            Self::Moving(moving) => moving.as_ref(),
             Self::Cpu(renderer) => renderer.as_ref(),
         }
     }
@@ -334,6 +394,7 @@ impl Renderer {
     fn backend_mut(&mut self) -> &mut dyn Backend {
         match self {
             Self::Device(renderer) => renderer.as_mut(),
+            Self::Moving(moving) => moving.as_mut(),
             Self::Cpu(renderer) => renderer.as_mut(),
         }
     }

@@ -240,6 +240,11 @@ impl Rendered {
         }
     }
 
+    /// The squared noise of each pixel's channels; `None` as in [`Rendered::error`].
+    pub(super) fn noise2(&self) -> Option<Vec<[f64; 3]>> {
+        self.of.estimate.noise2_of_pixels(self.of.iterations, &self.of.picture)
+    }
+
     /// Warnings about the picture.
     pub fn warnings(&self) -> Vec<Warning> {
         let Subject {

@@ -13,6 +13,7 @@ use crate::backend::{Backend, Resolved, settings};
 use crate::config::{Accel, Part, RenderConfig};
 use crate::error::{Error, Result};
 use crate::gather::METHODS;
+use crate::packing::PackedScene;
 use crate::pipeline::scene_buffers;
 use crate::scene::Camera;
 use crate::state::{self, Blocks};
@@ -32,28 +33,21 @@ pub(super) struct Identity {
 
 impl Identity {
     pub fn of(scene: &PreparedScene, camera: &Camera, config: &RenderConfig, is_cpu: bool) -> Self {
-        let packed = scene.packed();
-        let by_bvh = RenderConfig {
-            accel: Accel::Bvh,
-            ..config.clone()
-        };
-        let mut content = blake3::Hasher::new();
-        for (id, bytes) in scene_buffers(packed, &by_bvh) {
-            content.update(format!("{id:?} {}", bytes.len()).as_bytes());
-            content.update(bytes);
-        }
-        // The same for all parts.
-        let whole = RenderConfig {
-            part: Part::WHOLE,
-            ..config.clone()
-        };
-        content.update(bytemuck::bytes_of(&settings(&whole, packed, camera, 0)));
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             renderer: if is_cpu { "cpu" } else { "vulkan" }.to_owned(),
-            scene: content.finalize().to_hex().to_string(),
+            scene: hash_of(scene.packed(), camera, config),
             part: config.part,
             settings: named(config),
+        }
+    }
+
+    /// The same of a render with motion blur between two times.
+    pub fn between(&self, config: &RenderConfig, ends: &[(PackedScene, Camera); 2]) -> Self {
+        let [opening, closing] = ends.each_ref().map(|(scene, camera)| hash_of(scene, camera, config));
+        Self {
+            scene: format!("{}, from {opening} to {closing}", self.scene),
+            ..self.clone()
         }
     }
 
@@ -94,6 +88,26 @@ impl Identity {
         }
         differences
     }
+}
+
+/// Hash of what rays read of a scene, and of the camera.
+fn hash_of(scene: &PackedScene, camera: &Camera, config: &RenderConfig) -> String {
+    let by_bvh = RenderConfig {
+        accel: Accel::Bvh,
+        ..config.clone()
+    };
+    let mut content = blake3::Hasher::new();
+    for (id, bytes) in scene_buffers(scene, &by_bvh) {
+        content.update(format!("{id:?} {}", bytes.len()).as_bytes());
+        content.update(bytes);
+    }
+    // The same for all parts.
+    let whole = RenderConfig {
+        part: Part::WHOLE,
+        ..config.clone()
+    };
+    content.update(bytemuck::bytes_of(&settings(&whole, scene, camera, 0)));
+    content.finalize().to_hex().to_string()
 }
 
 /// The settings that a state depends on, by name.

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::super::events::{Event, Iteration, Listener, Phase};
+use super::super::events::{Event, Frame, Iteration, Listener, Phase};
 use ppm_vk::{Image, Rendered, Snapshot, StageTimes};
 
 /// A browser that asked within this time still shows the page.
@@ -25,6 +25,8 @@ pub struct Board {
 
 struct Shown {
     title: String,
+    /// The frame of an animation.
+    frame: Option<Frame>,
     phase: Option<Phase>,
     iteration: Option<Iteration>,
     /// Seconds of rendering and estimated error.
@@ -52,6 +54,7 @@ impl Board {
         Self {
             shown: Mutex::new(Shown {
                 title,
+                frame: None,
                 phase: None,
                 iteration: None,
                 errors: Vec::new(),
@@ -115,6 +118,7 @@ impl Board {
         });
         let status = json!({
             "title": shown.title,
+            "frame": shown.frame,
             "phase": shown.phase,
             "progress": shown.iteration,
             "picture": picture,
@@ -177,6 +181,11 @@ impl Listener for Arc<Board> {
     fn hear(&self, event: &Event, _: f64) {
         let mut shown = self.shown();
         match event {
+            Event::Frame(frame) => {
+                shown.frame = Some(*frame);
+                shown.iteration = None;
+                shown.errors.clear();
+            }
             Event::Phase { phase } => shown.phase = Some(*phase),
             Event::Iteration(iteration) => {
                 shown.add_error(iteration);

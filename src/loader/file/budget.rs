@@ -1,8 +1,8 @@
 //! The memory budget of a scene.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
 use std::fmt::Display;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::loader::diagnostic::Check;
 use crate::text::bytes;
@@ -30,7 +30,22 @@ pub(crate) struct Refusal {
 }
 
 /// The first refusal of a budget; it outlives the budget.
-pub(crate) type FirstRefusal = Rc<RefCell<Option<Refusal>>>;
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FirstRefusal(Arc<Mutex<Option<Refusal>>>);
+
+impl FirstRefusal {
+    /// The refusal, if there was one.
+    pub(crate) fn get(&self) -> Option<Refusal> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn set(&self, refusal: Refusal) {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert(refusal);
+    }
+}
 
 impl Budget {
     /// An unused budget.
@@ -44,7 +59,7 @@ impl Budget {
 
     /// The place of the first refusal.
     pub(crate) fn refused(&self) -> FirstRefusal {
-        Rc::clone(&self.refused)
+        self.refused.clone()
     }
 
     /// Takes `size` bytes for `what` permanently.
@@ -52,6 +67,11 @@ impl Budget {
         self.check(size, what)?;
         self.taken.set(self.taken.get() + size);
         Ok(())
+    }
+
+    /// Gives back bytes that were taken.
+    pub(crate) fn give_back(&self, size: u64) {
+        self.taken.set(self.taken.get().saturating_sub(size));
     }
 
     /// Whether `size` bytes are available for `what` temporarily.
@@ -71,16 +91,13 @@ impl Budget {
             what: text.clone(),
             needed,
         };
-        self.refused.borrow_mut().get_or_insert(refusal);
+        self.refused.set(refusal);
         Err(text)
     }
 
     /// Fails if any request was refused, even if the scene could do without it.
     pub(crate) fn settle(&self) -> Check<()> {
-        self.refused
-            .borrow()
-            .clone()
-            .map_or(Ok(()), |refusal| Err(refusal.what))
+        self.refused.get().map_or(Ok(()), |refusal| Err(refusal.what))
     }
 }
 
@@ -96,7 +113,7 @@ mod tests {
         budget.settle().expect("nothing was refused");
         let error = budget.take((2 << 30) + 1, "image 3").expect_err("no room");
         assert!(error.starts_with("image 3 needs 2.0 GiB"), "{error}");
-        let refused = budget.refused().borrow().clone().expect("a refusal");
+        let refused = budget.refused().get().expect("a refusal");
         assert_eq!((refused.what, refused.needed), (error.clone(), (3 << 30) + 1));
         assert_eq!(budget.settle(), Err(error));
         budget.check(u64::MAX, "all").expect_err("no room");

@@ -19,6 +19,7 @@ use crate::loader::animation::Pose;
 use crate::loader::diagnostic::{Check, Warnings, damaged, primitive_label};
 use crate::loader::file::document::Document;
 use crate::loader::graph::{PlacedNode, node_label};
+use crate::scene::Normalisation;
 use crate::text::{list, quote};
 
 /// Maximum number of morph targets and sets of joints of all triangles together.
@@ -123,14 +124,16 @@ pub(crate) fn instances<'a>(
     Ok(instances)
 }
 
-/// Builds the triangles of all instances in render space, except those without area.
+/// Builds the triangles of all instances in render space, except those without area. `normalisation`: `None` for that of their
+/// bounds.
 pub(crate) fn assemble(
     document: &Document,
     instances: &[MeshInstance<'_>],
+    normalisation: Option<Normalisation>,
     warnings: &mut Warnings,
 ) -> Check<Geometry> {
     let root = &document.root;
-    let normalisation = normalise(root, instances)?;
+    let normalisation = normalisation.map_or_else(|| normalise(root, instances), Ok)?;
     let mut builder = Builder::new(normalisation, sharing::sharing_pays(root, instances));
     let mut dropped: Vec<(String, usize)> = Vec::new();
     for instance in instances {
