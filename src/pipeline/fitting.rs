@@ -88,7 +88,7 @@ pub(super) fn check_fits(
 /// The crops of what is shown of a picture that a device can render, one if it can render that at once.
 ///
 /// # Errors
-/// As [`check_fits`], if it can render none.
+/// [`Error::Unfit`], if it can render none.
 pub fn crops(scene: &PackedScene, config: &RenderConfig, device: &DeviceSummary) -> Result<Vec<Region>> {
     let config = &RenderConfig {
         accel: accel_on(config, device)?,

@@ -242,7 +242,10 @@ impl Rendered {
 
     /// The squared noise of each pixel's channels; `None` as in [`Rendered::error`].
     pub(super) fn noise2(&self) -> Option<Vec<[f64; 3]>> {
-        self.of.estimate.noise2_of_pixels(self.of.iterations, &self.of.picture)
+        // A picture that was put together has no sequences any more.
+        let has_sequences = self.of.given.is_none();
+        let of_pixels = || self.of.estimate.noise2_of_pixels(self.of.iterations, &self.of.picture);
+        has_sequences.then(of_pixels).flatten()
     }
 
     /// Warnings about the picture.
