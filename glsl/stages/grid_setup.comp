@@ -28,8 +28,10 @@ void main() {
         return;
     }
     ShellRadii radii = radii_of_shells[i];
-    // A shell without guides has few visible points, with radii of about those at first.
-    float balanced = CELLS_TO_RADIUS * (radii.count > 0u ? mean_radius(radii) : first_radius(i));
+    // Without visible points any size will do; small cells distribute photons evenly over the table. If not all pixels are guides,
+    // a shell without any has few visible points, with radii of about those at first.
+    float radius = settings.guides.x == 0u ? 0.0 : first_radius(i);
+    float balanced = CELLS_TO_RADIUS * (radii.count > 0u ? mean_radius(radii) : radius);
     float bounded = sqrt(uintBitsToFloat(radii.largest)) / MOST_CELLS;
     float size = max(max(balanced, bounded), SMALLEST_CELL);
     grid.inverse_cell_size[i] = 1.0 / size;
