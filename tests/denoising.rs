@@ -4,6 +4,7 @@
 #[path = "denoising/real.rs"]
 mod real;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -178,6 +179,24 @@ fn the_picture_is_denoised_and_the_noisy_one_is_a_layer_with_the_same_bits() {
             png("o.png") != png("noisy.png"),
             "{backend}: the PNG is the noisy picture"
         );
+    }
+}
+
+#[test]
+fn layers_of_albedo_and_normals_guide_the_denoiser() {
+    let folder = TempDir::new().expect("folder");
+    let library = fake(folder.path(), 2, false);
+    for (layers, divisor) in [("albedo,normal", 4.0), ("samples", 2.0)] {
+        assert_done(&render(folder.path(), &library, &["--aov", layers, "--denoise"]));
+        let channels: BTreeMap<_, _> = channels(&folder.path().join("o.exr")).into_iter().collect();
+        let pixels = channels["R"].iter().zip(&channels["noisy_R"]);
+        for (found, noisy) in pixels {
+            let expected = noisy / divisor;
+            assert!(
+                (found - expected).abs() <= 1e-6 * expected,
+                "{layers}: {found} of {noisy}"
+            );
+        }
     }
 }
 

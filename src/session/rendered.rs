@@ -11,12 +11,13 @@ use super::state::Identity;
 use super::work::Done;
 use crate::backend::{DeviceDescription, Resolved};
 use crate::config::{Layers, Region, RenderConfig, SequenceIterations};
-use crate::denoise::{self, Denoiser};
+use crate::denoise::{self, Denoiser, Guides};
 use crate::error::{Error, Result};
 #[cfg(test)]
 use crate::estimate::OnePhoton;
 use crate::estimate::{ErrorEstimate, RelativeError};
 use crate::film::{self, Additions, Image, Look, Metadata, ViewLayer};
+use crate::layout::SurfaceSum;
 use crate::report::{Profile, Subject};
 
 /// The failure that ended a render early.
@@ -182,8 +183,9 @@ impl Rendered {
     /// # Errors
     /// As [`Denoiser::denoise`]. The picture stays as it is.
     pub fn denoise(&mut self, denoiser: &Denoiser) -> Result<()> {
-        // Guides: the picture has no layers of albedo and normals yet.
-        let denoised = denoiser.denoise(self.noisy(), None)?;
+        let guides = self.guides();
+        let guides = guides.as_ref().map(|[albedo, normal]| Guides { albedo, normal });
+        let denoised = denoiser.denoise(self.noisy(), guides)?;
         let image = match self.pixel_errors() {
             Some(errors) => denoise::blend(self.noisy(), &denoised, &errors),
             None => denoised,
@@ -191,6 +193,14 @@ impl Rendered {
         let by = denoiser.name();
         self.denoised = Some(Denoised { image, by });
         Ok(())
+    }
+
+    /// Albedo and normals of what the picture shows, if it has layers that need them.
+    fn guides(&self) -> Option<[Image; 2]> {
+        let surfaces = &self.of.picture.layers.surfaces;
+        let (width, height) = (self.noisy().width(), self.noisy().height());
+        let image = |of: fn(&SurfaceSum) -> [f32; 3]| Image::new(width, height, surfaces.iter().map(of).collect());
+        (!surfaces.is_empty()).then(|| [image(SurfaceSum::mean_albedo), image(SurfaceSum::mean_normal)])
     }
 
     /// Of each pixel, the share of its camera paths that met a surface.
