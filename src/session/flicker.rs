@@ -23,7 +23,7 @@ pub struct Flicker {
     pub still: f64,
     /// Relative difference there.
     pub difference: f64,
-    /// The difference there that independent noise of both frames explains. With one seed the noise of both is similar, and the
+    /// The difference there that independent noise of both frames explains. With one seed the noise of both may be similar, and the
     /// difference smaller.
     pub noise: f64,
 }
