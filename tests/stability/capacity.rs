@@ -182,7 +182,7 @@ fn photon_buffers_a_hundred_times_too_small_repeat_iterations_and_lose_nothing()
 }
 
 /// Pilot paths leave ten times as many photons as expected: rounds are repeated in smaller batches, and the learned photons are
-/// limited to a batch. The ratio's standard deviation is 1.1 % (16 seeds), so that a right program fails once in 3·10⁴ times.
+/// limited to a batch. The ratio's standard deviation is 0.5 % (8 seeds), so that a right program fails less than once in 10⁶ times.
 #[test]
 fn pilot_paths_whose_photons_do_not_fit_are_learned_from_in_smaller_batches() {
     const PATHS: u32 = 20_000;
@@ -196,13 +196,13 @@ fn pilot_paths_whose_photons_do_not_fit_are_learned_from_in_smaller_batches() {
         max_depth: 50,
         ..square(16, PATHS)
     };
-    let free = render(&scene, 0, 4, config.clone());
-    let tight = render_within(Some(u64::from(PATHS / 10) * 50), &scene, 0, 4, config);
+    let free = render(&scene, 0, 8, config.clone());
+    let tight = render_within(Some(u64::from(PATHS / 10) * 50), &scene, 0, 8, config);
     let sizes = tight.renderer.sizes();
     println!("{} paths in a batch", sizes.batch_paths);
     assert!(tight.renderer.aim().is_some(), "nothing was aimed");
     assert!((20..1000).contains(&sizes.batch_paths), "{sizes:?}");
     let mean = |image| ppm_vk::internals::metrics::mean(image)[0];
     let ratio = mean(&tight.image) / mean(&free.image);
-    assert!((ratio - 1.0).abs() < 0.045, "{ratio} of the light");
+    assert!((ratio - 1.0).abs() < 0.03, "{ratio} of the light");
 }
