@@ -2,18 +2,19 @@
 
 #[path = "program/animated.rs"]
 mod animated;
+#[path = "program/frames.rs"]
+mod frames;
 #[path = "program/mod.rs"]
 mod program;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ppm_vk::{Flicker, Image, Platform, PreparedScene, RenderConfig, Scene, Session, Until, read_exr};
+use frames::{assert_frames_go_on_and_merge, picture, render};
+use ppm_vk::{Flicker, Platform, PreparedScene, RenderConfig, Scene, Session, Until};
 use program::{ppm_vk, stderr};
 use serde_json::Value;
 use tempfile::TempDir;
-
-const SMALL: [&str; 5] = ["--quiet", "--resolution", "48x32", "--photons", "4000"];
 
 /// A folder with the animated Cornell box, `scene.gltf`.
 fn animated_cornell() -> TempDir {
@@ -24,22 +25,6 @@ fn animated_cornell() -> TempDir {
 
 fn shipped(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
-}
-
-/// Renders; returns stdout.
-#[track_caller]
-fn render(folder: &TempDir, scene: &str, more: &[&str]) -> String {
-    let mut arguments = [&["--scene", scene], &SMALL[..], more].concat();
-    if !more.contains(&"--iterations") {
-        arguments.extend(["--iterations", "8"]);
-    }
-    let output = ppm_vk(folder.path(), &arguments);
-    assert_eq!(output.status.code(), Some(0), "{more:?}: {}", stderr(&output));
-    String::from_utf8(output.stdout).expect("UTF-8")
-}
-
-fn picture(folder: &TempDir, name: &str) -> Image {
-    read_exr(&folder.path().join(name)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The events of a kind.
@@ -201,22 +186,7 @@ fn where_nothing_moves_frames_differ_by_no_more_than_the_noise() {
 #[test]
 fn states_and_parts_are_those_of_each_frame() {
     let folder = animated_cornell();
-    let frames = ["--frames", "0..1", "--fps", "2"];
-    let render = |more: &[&str]| render(&folder, "scene.gltf", &[&frames[..], more].concat());
-    render(&["-o", "whole.exr"]);
-    render(&["-o", "on.exr", "--state", "on.state", "--iterations", "3"]);
-    render(&["-o", "on.exr", "--state", "on.state", "--resume"]);
-    for part in ["1/2", "2/2"] {
-        let state = format!("part{}.state", &part[..1]);
-        render(&["-o", "part.exr", "--state", &state, "--part", part]);
-    }
-    for frame in ["0000", "0001"] {
-        let [whole, on] = ["whole", "on"].map(|name| picture(&folder, &format!("{name}.{frame}.exr")));
-        assert!(whole == on, "frame {frame} goes on with other bits");
-        let [first, second] = [1, 2].map(|part| format!("part{part}.{frame}.state"));
-        let merged = ppm_vk(folder.path(), &["merge", &first, &second, "-o", "merged.exr"]);
-        assert_eq!(merged.status.code(), Some(0), "{}", stderr(&merged));
-    }
+    assert_frames_go_on_and_merge(&folder, &["--frames", "0..1", "--fps", "2"], ["0000", "0001"]);
 }
 
 #[test]

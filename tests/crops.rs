@@ -31,7 +31,9 @@ impl File {
         arguments.extend(more);
         let output = ppm_vk(folder, &arguments);
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
-        Self::read(&folder.join(name))
+        let file = Self::read(&folder.join(name));
+        assert_eq!(file.whole, WHOLE, "{arguments:?}");
+        file
     }
 
     fn read(path: &Path) -> Self {
@@ -66,7 +68,7 @@ impl File {
     }
 
     fn assert_shows_the_same(&self, whole: &Self, what: &str) {
-        assert_eq!((self.whole, whole.whole), (WHOLE, WHOLE), "{what}");
+        assert_eq!(self.whole, whole.whole, "{what}");
         // The estimate of an error uses the pixels around.
         let is_exact = |name: &&String| !name.starts_with("error");
         for channel in whole.channels.keys().filter(is_exact) {
@@ -162,10 +164,5 @@ fn a_picture_larger_than_a_devices_buffers_is_rendered_in_crops() {
     assert!(seen > 4000 * 4000, "{seen} pixels show a surface");
     let (part, _) = file("part.exr", &["--crop", "3600,2000,400x300"]);
     assert!(part.channels["A"].contains(&1.0));
-    for channel in ["R", "G", "B", "A"] {
-        for y in part.origin[1]..part.origin[1] + part.size[1] {
-            let rows = [&part, &whole].map(|file| file.row(channel, [part.origin[0], y], part.size[0]));
-            assert!(rows[0] == rows[1], "{channel}, row {y}: pixels of the crop differ");
-        }
-    }
+    part.assert_shows_the_same(&whole, "7680×4320");
 }

@@ -2,14 +2,17 @@
 
 #[path = "program/animated.rs"]
 mod animated;
+#[path = "program/frames.rs"]
+mod frames;
 #[path = "program/mod.rs"]
 mod program;
 
 use std::path::Path;
 
+use frames::{assert_frames_go_on_and_merge, picture, render};
 use ppm_vk::{
     Camera, Image, LoadOptions, Motion, Normalisation, Platform, PreparedScene, RenderConfig, Rendered, Scene,
-    SceneFile, Session, Until, read_exr,
+    SceneFile, Session, Until,
 };
 use program::{ppm_vk, stderr};
 use tempfile::TempDir;
@@ -176,17 +179,6 @@ fn scene(name: &str) -> String {
     path.to_str().expect("UTF-8").to_owned()
 }
 
-#[track_caller]
-fn render(folder: &TempDir, scene: &str, more: &[&str]) {
-    let small = ["--quiet", "--resolution", "48x32", "--photons", "4000"];
-    let output = ppm_vk(folder.path(), &[&["--scene", scene], &small[..], more].concat());
-    assert_eq!(output.status.code(), Some(0), "{more:?}: {}", stderr(&output));
-}
-
-fn picture(folder: &TempDir, name: &str) -> Image {
-    read_exr(&folder.path().join(name)).unwrap_or_else(|error| panic!("{error}"))
-}
-
 #[test]
 fn where_nothing_moves_a_shutter_changes_no_bit() {
     let folder = TempDir::new().expect("folder");
@@ -206,21 +198,7 @@ fn frames_with_a_shutter_go_on_with_the_same_bits_and_merge() {
     let folder = TempDir::new().expect("folder");
     animated::cornell(folder.path());
     let of = ["--frames", "2..3", "--fps", "8", "--shutter", "0,0.5"];
-    let render = |more: &[&str]| render(&folder, "scene.gltf", &[&of[..], more].concat());
-    render(&["-o", "whole.exr", "--iterations", "9"]);
-    render(&["-o", "on.exr", "--state", "on.state", "--iterations", "6"]);
-    render(&["-o", "on.exr", "--state", "on.state", "--resume", "--iterations", "9"]);
-    for part in ["1/2", "2/2"] {
-        let state = format!("part{}.state", &part[..1]);
-        render(&["-o", "part.exr", "--state", &state, "--part", part, "--iterations", "4"]);
-    }
-    for frame in ["0002", "0003"] {
-        let [whole, on] = ["whole", "on"].map(|name| picture(&folder, &format!("{name}.{frame}.exr")));
-        assert!(whole == on, "frame {frame} goes on with other bits");
-        let [first, second] = [1, 2].map(|part| format!("part{part}.{frame}.state"));
-        let merged = ppm_vk(folder.path(), &["merge", &first, &second, "-o", "merged.exr"]);
-        assert_eq!(merged.status.code(), Some(0), "{}", stderr(&merged));
-    }
+    assert_frames_go_on_and_merge(&folder, &of, ["0002", "0003"]);
     assert!(picture(&folder, "whole.0002.exr") != picture(&folder, "whole.0003.exr"));
 }
 
