@@ -177,11 +177,8 @@ impl Error {
 
     /// Whether a device can't render the picture at once, but can render a smaller one, or [crops](crate::crops) of it.
     pub fn is_picture_too_large(&self) -> bool {
-        let remedy = match self {
-            Self::Unfit { remedy, .. } => Some(remedy),
-            _ => None,
-        };
-        matches!(remedy, Some(Remedy::Resolution(_)))
+        let Self::Unfit { remedy, .. } = self else { return false };
+        matches!(remedy, Remedy::Resolution(_))
     }
 
     /// A device whose limits are exceeded.

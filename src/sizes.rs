@@ -44,11 +44,9 @@ const EMISSION_TABLE_BYTES: usize =
 pub struct Sizes {
     /// The pixels that are rendered.
     pub region: Region,
-    /// Slots for them.
-    pub region_slots: u32,
     /// The guides, which are rendered in addition.
     pub guides: GuidePixels,
-    /// Slots for all of these.
+    /// Slots for all of these, the guides behind the others.
     pub pixel_slots: u32,
     /// Visible points a pixel.
     pub slots_per_pixel: u32,
@@ -137,8 +135,7 @@ impl Sizes {
     /// The sizes for a render.
     pub fn new(config: &RenderConfig, limits: Limits) -> Self {
         let (region, guides) = (config.region(), config.guides());
-        let region_slots = region.slots();
-        let pixel_slots = region_slots + guides.slots();
+        let pixel_slots = region.slots() + guides.slots();
         let fitting = limits.storage_buffer_bytes / size_of::<VisiblePoint>() as u64 / u64::from(pixel_slots);
         let slots_per_pixel = match config.estimator {
             Estimator::Ppm if limits.splitting => PPM_SLOTS.min(fitting.max(1) as u32),
@@ -157,7 +154,6 @@ impl Sizes {
             .max(1);
         let mut sizes = Self {
             region,
-            region_slots,
             guides,
             pixel_slots,
             slots_per_pixel,
@@ -330,7 +326,11 @@ impl Sizes {
 
     /// The slots from which is learned what all share.
     pub fn guide_slots(&self) -> Range<usize> {
-        let first = if self.guides.slots() > 0 { self.region_slots } else { 0 };
+        let first = if self.guides.slots() > 0 {
+            self.region.slots()
+        } else {
+            0
+        };
         (first * self.slots_per_pixel) as usize..self.slots() as usize
     }
 

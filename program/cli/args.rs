@@ -278,6 +278,11 @@ pub struct RenderArguments {
 }
 
 impl RenderArguments {
+    /// Whether an output needs the times of all launches.
+    pub fn needs_profile(&self) -> bool {
+        self.profile || self.profile_json.is_some() || self.trace.is_some()
+    }
+
     /// The files of the picture.
     pub fn picture_files(&self, files: &RenderFiles) -> PictureFiles {
         PictureFiles {

@@ -62,7 +62,7 @@ impl Job<'_> {
             let hooks = Hooks {
                 stop: &interrupt::requested,
                 progress: &|progress| events.tell(&Event::Iteration(meter.measure(share(progress)))),
-                profile: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
+                profile: arguments.needs_profile(),
                 snapshots: None,
             };
             mosaic.add(session.render_with(until, &hooks)?);

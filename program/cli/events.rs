@@ -34,8 +34,8 @@ pub enum Event {
         same_as: Option<u32>,
         /// Estimated relative error, if known.
         estimated_error: Option<f64>,
-        /// How it differs from the frame before it, if known.
-        flicker: Option<FlickerFigures>,
+        /// How it differs from the frame before it (docs/animation.md), if known.
+        flicker: Option<Flicker>,
     },
     /// A phase begins.
     Phase {
@@ -84,33 +84,6 @@ pub struct Frame {
     pub last: u32,
     /// Its time in the scene's animations, in seconds.
     pub time: f64,
-}
-
-/// How a frame differs from the one before it (docs/animation.md).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct FlickerFigures {
-    /// Share of the picture that does not change.
-    pub still: f64,
-    /// Relative difference there.
-    pub difference: f64,
-    /// The difference there that noise explains.
-    pub noise: f64,
-}
-
-impl From<Flicker> for FlickerFigures {
-    fn from(
-        Flicker {
-            still,
-            difference,
-            noise,
-        }: Flicker,
-    ) -> Self {
-        Self {
-            still,
-            difference,
-            noise,
-        }
-    }
 }
 
 /// The phases of a render, in order.

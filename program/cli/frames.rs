@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::args::RenderArguments;
-use super::events::{Event, Events, FlickerFigures, Frame};
+use super::events::{Event, Events, Frame};
 use ppm_vk::Rendered;
 
 /// Frames per second.
@@ -167,7 +167,7 @@ impl Shot {
             frame,
             same_as,
             estimated_error: rendered.error().map(|error| error.total),
-            flicker: flicker.map(FlickerFigures::from),
+            flicker,
         });
     }
 }

@@ -175,7 +175,7 @@ impl Job<'_> {
         let hooks = Hooks {
             stop: &interrupt::requested,
             progress: &|progress| events.tell(&Event::Iteration(meter.measure(progress))),
-            profile: arguments.profile || arguments.profile_json.is_some() || arguments.trace.is_some(),
+            profile: arguments.needs_profile(),
             snapshots: Some(Snapshots {
                 wanted: &|| takers.want(),
                 take: &|snapshot| takers.take(&snapshot),
@@ -316,27 +316,21 @@ fn print_profile(arguments: &RenderArguments, rendered: &Rendered) -> Result<()>
 }
 
 /// Tells of warnings about a picture.
-pub(super) fn tell_warnings(events: &Events, warnings: &[Warning]) {
+pub(super) fn tell_warnings<'a>(events: &Events, warnings: impl IntoIterator<Item = &'a Warning>) {
     for warning in warnings {
-        tell(warning, |text| events.note(text), |text| events.warning(text));
+        let text = advice::of_warning(warning);
+        if warning.is_slight() {
+            events.note(text);
+        } else {
+            events.warning(text);
+        }
     }
 }
 
 /// Tells of those that were not told of another frame.
 pub(super) fn tell_once(events: &Events, warnings: &[Warning]) {
-    for warning in warnings {
-        tell(warning, |text| events.note_once(text), |text| events.warning_once(text));
-    }
-}
-
-/// Tells of a warning, by one of two ways.
-fn tell(warning: &Warning, as_note: impl FnOnce(String), as_warning: impl FnOnce(String)) {
-    let text = advice::of_warning(warning);
-    if warning.is_slight() {
-        as_note(text);
-    } else {
-        as_warning(text);
-    }
+    let is_new = |warning: &&Warning| events.is_new(&advice::of_warning(warning));
+    tell_warnings(events, warnings.iter().filter(is_new));
 }
 
 /// Says how photons are gathered and start.

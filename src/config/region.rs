@@ -34,7 +34,10 @@ impl Region {
     }
 
     /// The parts of rows that belong to `inner`, which lies within.
-    pub fn cut<T: Clone>(&self, inner: &Self, rows: &[T]) -> Vec<T> {
+    pub fn cut<T: Clone>(&self, inner: &Self, rows: Vec<T>) -> Vec<T> {
+        if self == inner {
+            return rows;
+        }
         let [x, y] = [0, 1].map(|axis| (inner.origin[axis] - self.origin[axis]) as usize);
         let [width, height] = inner.size.map(|side| side as usize);
         let rows = rows.chunks_exact(self.size[0] as usize).skip(y).take(height);
@@ -106,7 +109,7 @@ const MARGIN: u32 = 40;
 pub struct GuidePixels {
     /// Pixels between neighbours.
     pub step: u32,
-    /// GuidePixels in a row, and rows; 0 if all pixels are guides.
+    /// Guides in a row, and rows; 0 if all pixels are guides.
     pub size: [u32; 2],
 }
 
@@ -189,7 +192,11 @@ mod tests {
         let mut covered = vec![0; 101 * 47];
         for crop in region.crops(20) {
             assert!(crop.size.iter().all(|&side| (1..=20).contains(&side)), "{crop}");
-            let ones: Vec<i32> = region.cut(&crop, &covered).iter().map(|count| count + 1).collect();
+            let ones: Vec<i32> = region
+                .cut(&crop, covered.clone())
+                .iter()
+                .map(|count| count + 1)
+                .collect();
             region.paste(&crop, &ones, &mut covered, 1);
         }
         assert!(covered.iter().all(|&count| count == 1), "{covered:?}");
@@ -205,7 +212,7 @@ mod tests {
         let widened = crop.widened(MARGIN, [1000, 40]);
         assert_eq!((widened.origin, widened.size), ([8, 0], [92, 40]));
         let rows: Vec<u32> = (0..92 * 40).collect();
-        let cut = widened.cut(&crop, &rows);
+        let cut = widened.cut(&crop, rows);
         assert_eq!((cut.len(), cut[0], cut[199]), (200, 3 * 92 + 42, 22 * 92 + 51));
     }
 }

@@ -4,8 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::accel_on;
-use super::memory::limits;
-use super::memory::scene_buffers;
+use super::memory::{limits, scene_buffers};
 use super::stages::Stages;
 use crate::config::{Region, RenderConfig, Totals};
 use crate::error::{Error, Remedy, Result, Setting};

@@ -230,28 +230,26 @@ impl Renderer {
         let (run, status) = self.run_reporting(recording)?;
         self.figures.counters.non_finite += u64::from(status.non_finite);
         self.figures.counters.photons_accepted = status.photons_accepted();
-        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, None)?;
+        let (region, shown) = (self.sizes.region, self.config.shown());
+        // Without the guides behind it.
+        let film: Vec<[f32; 4]> = self.device.download(BufferId::Film, Some(region.pixels() as usize))?;
         let behind_glass: Vec<BehindGlass> = self.device.download(BufferId::GlassFilm, None)?;
         let mut sequences = Vec::new();
         for film in SEQUENCE_FILMS {
-            sequences.extend(self.device.download::<[f32; 4]>(film, None)?);
+            sequences.extend(region.cut(&shown, self.device.download::<[f32; 4]>(film, None)?));
         }
-        let (region, shown) = (self.sizes.region, self.config.shown());
-        let pixels = region.pixels() as usize;
-        let sequences = sequences.chunks_exact(pixels);
-        let sequences = sequences.flat_map(|film| region.cut(&shown, film)).collect();
-        let film = region.cut(&shown, &film[..pixels]);
-        let mut resolved = Resolved::from_film(shown.size, &film, region.cut(&shown, &behind_glass), sequences);
+        let (film, behind_glass) = (region.cut(&shown, film), region.cut(&shown, behind_glass));
+        let mut resolved = Resolved::from_film(shown.size, &film, behind_glass, sequences);
         let layers = self.config.layers;
         if layers.show_surfaces() {
             let surfaces: Vec<SurfaceSum> = self.device.download(BufferId::SurfaceSums, None)?;
-            resolved.layers.surfaces = region.cut(&shown, &surfaces);
+            resolved.layers.surfaces = region.cut(&shown, surfaces);
             let ids: Vec<[IdCount; 2 * IDS_OF_PIXEL as usize]> = self.device.download(BufferId::IdCounts, None)?;
-            resolved.layers.ids = region.cut(&shown, &ids).into_flattened();
+            resolved.layers.ids = region.cut(&shown, ids).into_flattened();
         }
         if layers.show_light() {
             let light: Vec<LightParts> = self.device.download(BufferId::LightPartsFilm, None)?;
-            resolved.layers.light = region.cut(&shown, &light);
+            resolved.layers.light = region.cut(&shown, light);
         }
         Ok((run, resolved))
     }

@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::layout::Settings;
 use crate::packing::{IN_VACUUM, PackedScene};
 use crate::scene::Camera;
+use crate::stage::BufferId;
 
 impl Renderer {
     /// Shows a scene at another time, in the same render space: the next iterations are of that. `first`: the scene by which photon
@@ -26,12 +27,14 @@ impl Renderer {
     ) -> Result<()> {
         self.complete_ahead()?;
         let buffers = scene_buffers(scene, &self.config);
+        let mut has_moved = false;
         for ((id, bytes), (_, old)) in buffers.into_iter().zip(scene_buffers(before, &self.config)) {
             if bytes != old {
                 self.device.upload(id, bytes)?;
+                has_moved |= [BufferId::ShadingTriangles, BufferId::Instances].contains(&id);
             }
         }
-        if self.config.accel == Accel::RayQuery && has_moved(before, scene) {
+        if self.config.accel == Accel::RayQuery && has_moved {
             build_structures(&mut self.device, scene)?;
         }
         let new = settings(&self.config, scene, camera, self.settings.loop_limit);
@@ -48,14 +51,4 @@ impl Renderer {
         }
         self.upload_settings()
     }
-}
-
-/// Whether rays meet other triangles.
-fn has_moved(before: &PackedScene, scene: &PackedScene) -> bool {
-    let bytes = |scene: &PackedScene| {
-        let triangles = bytemuck::cast_slice::<_, u8>(&scene.shading_triangles);
-        let instances = bytemuck::cast_slice::<_, u8>(&scene.instances);
-        [blake3::hash(triangles), blake3::hash(instances)]
-    };
-    bytes(before) != bytes(scene)
 }

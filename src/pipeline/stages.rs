@@ -108,7 +108,7 @@ impl Stages<'_> {
         // After the photons, because an iteration that has to be repeated must stop before it adds anything.
         if self.config.layers.show_surfaces() && self.config.finds_visible_points(iteration) {
             recording.dispatch(
-                self.ray_stage(&shaders::LAYERS, self.sizes.region_slots)
+                self.ray_stage(&shaders::LAYERS, self.sizes.region.slots())
                     .push(shaders::CameraTurnPush::from(turn)),
             );
         }
@@ -145,7 +145,7 @@ impl Stages<'_> {
         let iterations = totals.at_least_one().iterations;
         for (sequence, (sums, film)) in (0..).zip(SEQUENCE_SUMS.into_iter().zip(SEQUENCE_FILMS)) {
             recording.dispatch(
-                StageDesc::new(&shaders::RESOLVE_SEQUENCE, self.sizes.region_slots)
+                StageDesc::new(&shaders::RESOLVE_SEQUENCE, self.sizes.region.slots())
                     .push(shaders::ResolveSequencePush {
                         iterations: iterations_of(sequence, iterations),
                     })

@@ -17,7 +17,7 @@ const CHANGES: f64 = 2.0;
 /// Differences are as relMSE has them: (x − y)² / (m² + 0.01·M²), with m the mean of both pixels and M that of both pictures, root of
 /// the mean. They are taken of the tiles (8×8 pixels) in which noise explains a quarter or more of the squared difference: the others
 /// show what moves, or its light.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Flicker {
     /// Share of the picture that does not change.
     pub still: f64,
